@@ -1,0 +1,108 @@
+//! The command line: what it accepts, and the one place where a process ends.
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::panic::PanicHookInfo;
+
+use clap::error::ErrorKind;
+use clap::{Parser, Subcommand};
+
+use crate::commands::{check::CheckArguments, convert::ConvertArguments};
+use crate::outcome::{ExitStatus, Failure, Outcome, one_line};
+
+/// Finds which physics a simulated tendon-driven joint lacks, from recordings of the real one
+#[derive(Debug, Parser)]
+#[command(name = "bowden", version, subcommand_required = true, arg_required_else_help = false)]
+#[command(
+    after_help = "Exit status: 0 done, 1 failed, 2 bad usage or unusable input, 3 done but something was lost \
+                        or repaired (stderr says what)."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to work with [default: one a processor]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// No progress on stderr
+    #[arg(long, global = true)]
+    quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Read recordings and a rig and say what they hold
+    Check(CheckArguments),
+    /// Write a recording in another format
+    Convert(ConvertArguments),
+}
+
+/// Runs a command line, says on stderr what there is to say, and returns the exit status.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitStatus {
+    std::panic::set_hook(Box::new(|panic| {
+        say(&panic_line(panic));
+        std::process::exit(ExitStatus::Failed as i32);
+    }));
+    let result = match Cli::try_parse_from(arguments) {
+        Ok(cli) => dispatch(&cli),
+        Err(error) => usage(&error),
+    };
+    match &result {
+        Ok(outcome) => outcome.notes().iter().for_each(|note| say(note)),
+        Err(failure) => say(failure.message()),
+    }
+    ExitStatus::from(&result)
+}
+
+fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
+    if let Some(jobs) = cli.jobs {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs.into())
+            .build_global()
+            .map_err(|error| Failure::failed(format!("--jobs {jobs}: {error}")))?;
+    }
+    match &cli.command {
+        Command::Check(arguments) => arguments.run(),
+        Command::Convert(arguments) => arguments.run(),
+    }
+}
+
+/// One line on stderr; a closed stderr is no reason to stop.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "bowden: {line}");
+}
+
+/// Help and version are results; anything else is bad usage, in one line.
+fn usage(error: &clap::Error) -> Result<Outcome, Failure> {
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        crate::commands::print(&error.render().to_string())?;
+        return Ok(Outcome::done());
+    }
+    let text = error.render().to_string();
+    let parts: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let what = parts.join(" ");
+    let what = what.strip_prefix("error: ").unwrap_or(&what);
+    Err(Failure::bad_input(format!("{what}; see `bowden --help`")))
+}
+
+/// A defect of this program, in one line.
+fn panic_line(panic: &PanicHookInfo) -> String {
+    let what = panic.payload_as_str().unwrap_or("no message");
+    let place = panic.location().map_or_else(String::new, |place| format!(" at {place}"));
+    one_line(&format!("internal error{place}: {what}; please report this with the command line"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,50 @@
+//! The subcommands, one file each: arguments, checks of what they name, a library call, and what is printed.
+
+pub mod check;
+pub mod convert;
+pub mod diagnose;
+pub mod fit;
+pub mod replay;
+pub mod simulate;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::outcome::{Failure, Outcome};
+use crate::output;
+use crate::recording::Recording;
+use crate::rig::Rig;
+
+/// Writes a result to standard output. A reader that left early (`bowden check ... | head -1`) is no failure.
+///
+/// # Errors
+/// Exit status 1, if standard output refuses for another reason.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            let reason = output::describe(&error);
+            Err(Failure::failed(format!("standard output: cannot be written: {reason}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Loads recordings that are to be compared with a rig.
+fn load_recordings(rig: &Rig, paths: &[PathBuf]) -> Result<Vec<Recording>, Failure> {
+    paths.iter().map(|path| rig.load_recording(path)).collect()
+}
+
+/// Outcome of work on recordings: what was lost or repaired when they were read.
+fn outcome_of<'r>(recordings: impl IntoIterator<Item = &'r Recording>) -> Outcome {
+    let mut outcome = Outcome::done();
+    for recording in recordings {
+        outcome.extend(recording.notes());
+    }
+    outcome
+}
+
+/// Paths as the checks of outputs take them.
+fn all_paths<'p>(groups: &[&'p [PathBuf]]) -> Vec<&'p Path> {
+    groups.iter().flat_map(|group| group.iter().map(PathBuf::as_path)).collect()
+}

@@ -1,0 +1,79 @@
+//! `bowden check`: reads recordings, and a rig, as the other commands would, and says what they hold.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use super::{outcome_of, print};
+use crate::outcome::{Failure, Outcome};
+use crate::recording::{Column, ReadOptions, Recording};
+use crate::rig::Rig;
+
+/// Arguments of `bowden check`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct CheckArguments {
+    /// Recordings to read (.csv, .csv.gz, .mcap)
+    #[arg(required_unless_present = "rig")]
+    recordings: Vec<PathBuf>,
+    /// Rig file whose column names, units and parts the recordings are held against
+    #[arg(long, value_name = "RIG.toml")]
+    rig: Option<PathBuf>,
+}
+
+impl CheckArguments {
+    /// Reads everything and prints one line a file.
+    ///
+    /// # Errors
+    /// What makes a file unusable.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let rig = self.rig.as_deref().map(Rig::load).transpose()?;
+        let mut text = String::new();
+        if let (Some(rig), Some(path)) = (&rig, &self.rig) {
+            let effects: Vec<&str> = rig.effects.iter().map(|effect| effect.descriptor().id).collect();
+            let effects = if effects.is_empty() { "no effects".to_owned() } else { effects.join(", ") };
+            let _ = writeln!(text, "{}: rig `{}`, {effects}", path.display(), rig.name);
+        }
+        let mut outcome = Outcome::done();
+        for path in &self.recordings {
+            let recording = match &rig {
+                Some(rig) => rig.load_recording(path)?,
+                None => Recording::load(path, &ReadOptions::default())?,
+            };
+            let _ = writeln!(text, "{}", describe(&recording));
+            if let Some(rig) = &rig {
+                let roles = rig.roles(&recording)?;
+                let names = |channels: &[bowden_model::channel::Channel]| {
+                    channels.iter().map(|channel| channel.role()).collect::<Vec<_>>().join(", ")
+                };
+                let _ = writeln!(
+                    text,
+                    "  inputs: {}\n  outputs: {}",
+                    names(&roles.inputs),
+                    names(&roles.outputs)
+                );
+            }
+            outcome.extend(outcome_of([&recording]).notes());
+        }
+        print(&text)?;
+        Ok(outcome)
+    }
+}
+
+fn describe(recording: &Recording) -> String {
+    let names = |known: bool| -> Vec<&str> {
+        let kind = |column: &&Column| matches!(column, Column::Known { .. }) == known;
+        recording.columns().iter().filter(kind).map(Column::name).collect()
+    };
+    let mut text = format!(
+        "{}: {} samples, {:.3} s, median step {:.6} s; roles: {}",
+        recording.source(),
+        recording.len(),
+        recording.duration_s(),
+        recording.median_step_s().unwrap_or(0.0),
+        names(true).join(", ")
+    );
+    let unknown = names(false);
+    if !unknown.is_empty() {
+        let _ = write!(text, "; kept and not interpreted: {}", unknown.join(", "));
+    }
+    crate::outcome::one_line(&text)
+}

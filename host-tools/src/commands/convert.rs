@@ -1,0 +1,36 @@
+//! `bowden convert`: the same recording in another format.
+
+use std::path::PathBuf;
+
+use super::outcome_of;
+use crate::outcome::{Failure, Outcome};
+use crate::output;
+use crate::recording::{Format, ReadOptions, Recording};
+
+/// Arguments of `bowden convert`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ConvertArguments {
+    /// Recording to read (.csv, .csv.gz, .mcap)
+    input: PathBuf,
+    /// File to write; its name's ending gives the format: .csv, .csv.gz or .mcap
+    output: PathBuf,
+}
+
+impl ConvertArguments {
+    /// Reads and writes the recording.
+    ///
+    /// # Errors
+    /// What makes the input unusable or the output impossible.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        Format::for_output(&self.output)?;
+        output::check_file(&self.output, &[&self.input])?;
+        let recording = Recording::load(&self.input, &ReadOptions::default())?;
+        recording.save(&self.output)?;
+        let mut outcome = outcome_of([&recording]);
+        if let topics @ [_, ..] = recording.topics_passed_over() {
+            let topics = topics.join(", ");
+            outcome.extend([format!("{}: other topics were not copied: {topics}", recording.source())]);
+        }
+        Ok(outcome)
+    }
+}

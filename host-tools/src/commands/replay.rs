@@ -1,0 +1,46 @@
+//! `bowden replay`: what the rig's simulation answers to a recording's inputs.
+
+use std::path::PathBuf;
+
+use crate::outcome::Failure;
+use crate::output;
+use crate::recording::{Format, Recording};
+use crate::rig::Rig;
+
+/// Arguments of `bowden replay`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReplayArguments {
+    /// Recording whose inputs drive the simulation; its other columns are not read
+    recording: PathBuf,
+    /// Rig file
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// Prediction to write: `t_s` and every output, one row a recorded sample (.csv, .csv.gz, .mcap)
+    #[arg(long, value_name = "PRED.csv")]
+    out: PathBuf,
+}
+
+/// What a replay works on, checked.
+#[derive(Clone, Debug)]
+pub struct ReplayTask {
+    /// The bench.
+    pub rig: Rig,
+    /// Time and inputs.
+    pub recording: Recording,
+    /// Where the prediction goes.
+    pub out: PathBuf,
+}
+
+impl ReplayArguments {
+    /// Checks the output and reads the inputs.
+    ///
+    /// # Errors
+    /// What makes an input unusable or the output impossible.
+    pub fn prepare(&self) -> Result<ReplayTask, Failure> {
+        Format::for_output(&self.out)?;
+        output::check_file(&self.out, &[&self.recording, &self.rig])?;
+        let rig = Rig::load(&self.rig)?;
+        let recording = rig.load_inputs(&self.recording)?;
+        Ok(ReplayTask { rig, recording, out: self.out.clone() })
+    }
+}

@@ -1,0 +1,169 @@
+//! Parameters that an optimiser may move, and the coordinates in which it does.
+
+use bowden_model::effect::{ParameterSpec, Scale};
+use bowden_model::parameters::{NOMINAL_PARAMETERS, NominalParameter};
+
+use crate::joint_model::JointModel;
+
+/// Where a free parameter stands in a model.
+#[derive(Clone, Copy)]
+pub enum Place {
+    /// A nominal parameter.
+    Nominal(&'static NominalParameter),
+    /// Parameter `parameter` of effect `effect` of the model.
+    Effect {
+        /// Index into the model's effects.
+        effect: usize,
+        /// Index into its parameters.
+        parameter: usize,
+    },
+}
+
+/// A parameter that is fitted.
+///
+/// The optimiser's coordinate is `x = ln(p / p0)` for a ratio and `x = (p - p0) / size` for a difference, with the
+/// starting value `p0`; zero is the start.
+#[derive(Clone, Copy)]
+pub struct Free {
+    place: Place,
+    spec: ParameterSpec,
+    start: f64,
+    size: f64,
+    /// Standard deviation of the prior in the optimiser's coordinate; infinite for none.
+    prior_std: f64,
+}
+
+/// Standard deviation of what a user believes about a nominal parameter: a factor of 1.6 either way. Wide enough that
+/// data decide wherever they say anything, and a parameter that they do not touch stays where it was.
+const NOMINAL_PRIOR_STD: f64 = 0.5;
+
+impl Free {
+    /// A nominal parameter of `model`; `None` when the model lacks the part.
+    #[must_use]
+    pub fn nominal(model: &JointModel, section: &str, name: &str) -> Option<Self> {
+        let parameter = NOMINAL_PARAMETERS.iter().find(|p| p.section == section && p.spec.name == name)?;
+        let start = parameter.get(&model.parameters)?;
+        let ratio = start > 0.0 && !name.starts_with("viscous");
+        let mut spec = parameter.spec;
+        spec.scale = if ratio { Scale::Log } else { Scale::Linear };
+        let size = if ratio { 1.0 } else { spec.default.max(start) };
+        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior_std: NOMINAL_PRIOR_STD })
+    }
+
+    /// Parameter of an effect of `model`.
+    #[must_use]
+    pub fn effect(model: &JointModel, effect: usize, parameter: usize) -> Option<Self> {
+        let active = model.effects.get(effect)?;
+        let spec = *active.descriptor().parameters.get(parameter)?;
+        let start = active.parameters[parameter];
+        let size = match spec.scale {
+            Scale::Log => 1.0,
+            Scale::Linear if spec.default != 0.0 => spec.default.abs(),
+            Scale::Linear => 0.1 * (spec.upper - spec.lower),
+        };
+        Some(Self { place: Place::Effect { effect, parameter }, spec, start, size, prior_std: f64::INFINITY })
+    }
+
+    /// All parameters of one effect of `model`.
+    #[must_use]
+    pub fn of_effect(model: &JointModel, effect: usize) -> Vec<Self> {
+        let count = model.effects.get(effect).map_or(0, |active| active.descriptor().parameters.len());
+        (0..count).filter_map(|parameter| Self::effect(model, effect, parameter)).collect()
+    }
+
+    /// Where it stands.
+    #[must_use]
+    pub const fn place(&self) -> Place {
+        self.place
+    }
+
+    /// Name, unit and range.
+    #[must_use]
+    pub const fn spec(&self) -> &ParameterSpec {
+        &self.spec
+    }
+
+    /// Value before the fit.
+    #[must_use]
+    pub const fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Name as reports write it, `section.name`.
+    #[must_use]
+    pub fn path(&self, model: &JointModel) -> String {
+        match self.place {
+            Place::Nominal(parameter) => format!("{}.{}", parameter.section, parameter.spec.name),
+            Place::Effect { effect, .. } => {
+                let id = model.effects.get(effect).map_or("effect", |active| active.descriptor().id);
+                format!("{id}.{}", self.spec.name)
+            }
+        }
+    }
+
+    /// Value at the optimiser's coordinate `x`, kept inside the accepted range.
+    #[must_use]
+    pub fn value_at(&self, x: f64) -> f64 {
+        let value = match self.spec.scale {
+            Scale::Log if self.start > 0.0 => self.start * x.exp(),
+            _ => self.start + self.size * x,
+        };
+        value.clamp(self.spec.lower, self.spec.upper)
+    }
+
+    /// Slope of the value over the coordinate at `value`.
+    #[must_use]
+    pub fn slope_at(&self, value: f64) -> f64 {
+        match self.spec.scale {
+            Scale::Log if self.start > 0.0 => value,
+            _ => self.size,
+        }
+    }
+
+    /// Whether `value` lies at an end of the accepted range.
+    #[must_use]
+    pub fn at_bound(&self, value: f64) -> bool {
+        let tolerance = 1e-9 * (self.spec.upper - self.spec.lower);
+        value <= self.spec.lower + tolerance || value >= self.spec.upper - tolerance
+    }
+
+    /// Residual of the prior at `x`; zero where there is none.
+    #[must_use]
+    pub fn prior_residual(&self, x: f64) -> f64 {
+        x / self.prior_std
+    }
+
+    /// Writes the value at `x` into a model.
+    pub fn apply(&self, x: f64, model: &mut JointModel) {
+        let value = self.value_at(x);
+        match self.place {
+            Place::Nominal(parameter) => parameter.set(&mut model.parameters, value),
+            Place::Effect { effect, parameter } => {
+                if let Some(active) = model.effects.get_mut(effect) {
+                    active.parameters[parameter] = value;
+                }
+            }
+        }
+    }
+}
+
+/// Nominal parameters that a recalibration moves: one of each product that a replay cannot tell apart.
+///
+/// `μ` stands for `μ K`, `EA` for `EA / L`, the weight for `m l`; inertia of the rotor and gear ratio are counted and
+/// weighed when a bench is built.
+pub const RECALIBRATED: [(&str, &str); 8] = [
+    ("sheath", "friction_coefficient"),
+    ("tendon", "axial_stiffness_n"),
+    ("tendon", "pretension_n"),
+    ("motor", "resistance_ohm"),
+    ("motor", "torque_constant_nm_per_a"),
+    ("motor", "viscous_nm_s_per_rad"),
+    ("load", "mass_kg"),
+    ("load", "viscous_nm_s_per_rad"),
+];
+
+/// The parameters of [`RECALIBRATED`] that `model` has.
+#[must_use]
+pub fn recalibrated(model: &JointModel) -> Vec<Free> {
+    RECALIBRATED.iter().filter_map(|(section, name)| Free::nominal(model, section, name)).collect()
+}

@@ -1,0 +1,345 @@
+//! What a fit makes small: differences between recordings and replays, each in units of what it may be.
+//!
+//! Every output channel is compared in blocks of about ten milliseconds; a block's mean difference is divided by the
+//! channel's scale: sensor noise, a twelfth of a count squared, and 1.5 % of the channel's spread, which no model of a
+//! real bench undercuts. The torque that had to guide the motor counts as one more channel whose measured value is zero.
+//! A residual beyond three scales enters with its root only (soft L1), so that a few violent milliseconds do not decide.
+
+use bowden_model::channel::Channel;
+
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
+use crate::reconstruct::quantum_of;
+use crate::recording::Recording;
+use crate::simulation::{Prediction, ReplayInput, replay};
+
+/// Length of a block, s.
+const BLOCK_S: f64 = 0.01;
+
+/// Share of a channel's standard deviation that counts as agreement.
+const MODEL_FLOOR: f64 = 0.015;
+
+/// Same for angles, which a transmission of a few N·m/mrad reproduces far better than its tensions.
+const ANGLE_FLOOR: f64 = 0.002;
+
+/// Residual at which the soft L1 loss bends, in scales.
+const LOSS_BEND: f64 = 3.0;
+
+/// Time at the start of each recording that is not compared, s: how it came to rest is not known.
+const LEAD_IN_S: f64 = 0.3;
+
+/// Length of the stretches that are held out in turn, s.
+const STRETCH_S: f64 = 2.5;
+
+/// What the residual of one series measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Series {
+    /// A recorded output.
+    Channel(Channel),
+    /// The torque that guided the motor, N·m.
+    Guide,
+}
+
+impl Series {
+    /// Name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Channel(channel) => channel.role(),
+            Self::Guide => "motor_torque_nm",
+        }
+    }
+}
+
+/// Which part of the data a sum covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// What parameters are fitted to.
+    Training,
+    /// What they have not seen.
+    HeldOut,
+}
+
+#[derive(Clone, Debug)]
+struct Dataset {
+    input: ReplayInput,
+    measured: Vec<(Series, Vec<f64>)>,
+    blocks: Vec<Block>,
+}
+
+/// Samples that are compared as one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// First sample.
+    pub start: usize,
+    /// One past the last sample.
+    pub end: usize,
+    /// Use of the block.
+    pub part: Part,
+}
+
+/// Recordings, prepared for comparison.
+#[derive(Clone, Debug)]
+pub struct Objective {
+    datasets: Vec<Dataset>,
+    scales: Vec<(Series, f64)>,
+    free_offsets: Vec<Channel>,
+}
+
+/// Residuals of every series and block, in scales.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Residuals {
+    /// Series, dataset by dataset, block by block.
+    pub values: Vec<f64>,
+}
+
+impl Objective {
+    /// Prepares recordings. With `split`, stretches of every recording are held out in turn; without it the recordings
+    /// in `heldout` are, and all of `training` is fitted.
+    ///
+    /// # Errors
+    /// When an input is missing, or nothing can be compared.
+    pub fn new(
+        model: &JointModel,
+        training: &[Recording],
+        heldout: &[Recording],
+        split: bool,
+    ) -> Result<Self, Failure> {
+        let mut datasets = Vec::new();
+        for (recording, part) in training
+            .iter()
+            .map(|recording| (recording, Part::Training))
+            .chain(heldout.iter().map(|recording| (recording, Part::HeldOut)))
+        {
+            datasets.push(Dataset::new(model, recording, part, split && part == Part::Training)?);
+        }
+        let mut series: Vec<Series> = datasets.iter().flat_map(|d| d.measured.iter().map(|(s, _)| *s)).collect();
+        series.sort_unstable();
+        series.dedup();
+        if series.is_empty() {
+            let names: Vec<&str> = model.outputs.iter().map(|c| c.role()).collect();
+            return Err(Failure::bad_input(format!(
+                "the recordings hold none of the outputs that the rig predicts ({}); map a column to one of them",
+                names.join(", ")
+            )));
+        }
+        let scales = series.iter().map(|s| (*s, scale_of(model, *s, &datasets))).collect();
+        Ok(Self { datasets, scales, free_offsets: model.free_offsets.clone() })
+    }
+
+    /// All series with their scales, in the unit of the series.
+    #[must_use]
+    pub fn scales(&self) -> &[(Series, f64)] {
+        &self.scales
+    }
+
+    /// Number of recordings.
+    #[must_use]
+    pub fn recordings(&self) -> usize {
+        self.datasets.len()
+    }
+
+    /// Blocks of one recording.
+    #[must_use]
+    pub fn blocks(&self, recording: usize) -> &[Block] {
+        &self.datasets[recording].blocks
+    }
+
+    /// Inputs of one recording.
+    #[must_use]
+    pub fn input(&self, recording: usize) -> &ReplayInput {
+        &self.datasets[recording].input
+    }
+
+    /// Measured values of a series in one recording.
+    #[must_use]
+    pub fn measured(&self, recording: usize, series: Series) -> Option<&[f64]> {
+        self.datasets[recording].measured.iter().find(|(s, _)| *s == series).map(|(_, v)| v.as_slice())
+    }
+
+    /// Longest recording, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.datasets.iter().map(|d| d.input.t_s().last().unwrap_or(&0.0) - d.input.t_s()[0]).fold(0.0, f64::max)
+    }
+
+    /// Series, recording and block of every entry of [`Residuals::values`].
+    pub fn entries(&self) -> impl Iterator<Item = (Series, usize, Block)> + '_ {
+        self.datasets.iter().enumerate().flat_map(|(d, dataset)| {
+            dataset
+                .measured
+                .iter()
+                .flat_map(move |(series, _)| dataset.blocks.iter().map(move |block| (*series, d, *block)))
+        })
+    }
+
+    /// Replays every recording with `model`.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn predict(&self, model: &JointModel) -> Result<Vec<Prediction>, Failure> {
+        self.datasets.iter().map(|dataset| replay(model, &dataset.input)).collect()
+    }
+
+    /// Residuals of `model`.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn residuals(&self, model: &JointModel) -> Result<Residuals, Failure> {
+        Ok(self.compare(&self.predict(model)?))
+    }
+
+    /// Residuals of given predictions.
+    #[must_use]
+    pub fn compare(&self, predictions: &[Prediction]) -> Residuals {
+        let mut values = Vec::new();
+        for (dataset, prediction) in self.datasets.iter().zip(predictions) {
+            for (series, measured) in &dataset.measured {
+                let scale = self.scale(*series);
+                let predicted = match series {
+                    Series::Channel(channel) => prediction.channel(*channel).unwrap_or(&[]),
+                    Series::Guide => &prediction.guide_nm,
+                };
+                let offset = self.offset(*series, dataset, measured, predicted);
+                for block in &dataset.blocks {
+                    let sum: f64 = measured[block.start..block.end]
+                        .iter()
+                        .zip(&predicted[block.start..block.end])
+                        .map(|(m, p)| m - p)
+                        .sum();
+                    values.push((sum / (block.end - block.start) as f64 - offset) / scale);
+                }
+            }
+        }
+        Residuals { values }
+    }
+
+    /// Zero of a channel in one recording, where the rig says that it is arbitrary; else 0.
+    fn offset(&self, series: Series, dataset: &Dataset, measured: &[f64], predicted: &[f64]) -> f64 {
+        match series {
+            Series::Channel(channel) if self.free_offsets.contains(&channel) => {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for block in &dataset.blocks {
+                    for k in block.start..block.end {
+                        sum += measured[k] - predicted[k];
+                        count += 1.0;
+                    }
+                }
+                sum / f64::max(count, 1.0)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Scale of a series, in its unit.
+    #[must_use]
+    pub fn scale(&self, series: Series) -> f64 {
+        self.scales.iter().find(|(s, _)| *s == series).map_or(1.0, |(_, scale)| *scale)
+    }
+
+    /// Mean loss over a part of the data; 1 where every residual is one scale.
+    #[must_use]
+    pub fn mean_loss(&self, residuals: &Residuals, part: Part) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for ((_, _, block), value) in self.entries().zip(&residuals.values) {
+            if block.part == part {
+                sum += loss(*value);
+                count += 1.0;
+            }
+        }
+        sum / f64::max(count, 1.0)
+    }
+
+    /// Root mean square difference of a series over a part of the data, sample by sample, in its unit.
+    #[must_use]
+    pub fn rmse(&self, predictions: &[Prediction], series: Series, part: Part) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (dataset, prediction) in self.datasets.iter().zip(predictions) {
+            let Some((_, measured)) = dataset.measured.iter().find(|(s, _)| *s == series) else { continue };
+            let predicted = match series {
+                Series::Channel(channel) => prediction.channel(channel).unwrap_or(&[]),
+                Series::Guide => &prediction.guide_nm,
+            };
+            let offset = self.offset(series, dataset, measured, predicted);
+            for block in dataset.blocks.iter().filter(|block| block.part == part) {
+                for k in block.start..block.end {
+                    sum += (measured[k] - predicted[k] - offset).powi(2);
+                    count += 1.0;
+                }
+            }
+        }
+        f64::sqrt(sum / f64::max(count, 1.0))
+    }
+}
+
+impl Dataset {
+    fn new(model: &JointModel, recording: &Recording, part: Part, split: bool) -> Result<Self, Failure> {
+        let mut input = ReplayInput::new(model, recording)?;
+        if input.motion().is_none()
+            && let Some(theta) = recording.channel(Channel::ThetaIn).or(recording.channel(Channel::ThetaOut))
+        {
+            input.start_at(theta[0], 0.0);
+        }
+        let mut measured: Vec<(Series, Vec<f64>)> = model
+            .outputs
+            .iter()
+            .filter_map(|channel| recording.channel(*channel).map(|v| (Series::Channel(*channel), v.to_vec())))
+            .collect();
+        if model.drive()? == crate::joint_model::Drive::GuidedMotor {
+            measured.push((Series::Guide, vec![0.0; recording.len()]));
+        }
+        let t_s = input.t_s();
+        let mut blocks: Vec<Block> = Vec::new();
+        let mut start = t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
+        while start < t_s.len() {
+            let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
+            let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
+            let held = split && stretch % 3 == 2;
+            blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });
+            start = end;
+        }
+        Ok(Self { input, measured, blocks })
+    }
+}
+
+/// Loss of a residual: `r²` up to the bend, growing with `|r|` beyond.
+#[must_use]
+pub fn loss(residual: f64) -> f64 {
+    soft(residual).powi(2)
+}
+
+/// The number whose square is the soft L1 loss of `residual`.
+#[must_use]
+pub fn soft(residual: f64) -> f64 {
+    let z = residual / LOSS_BEND;
+    LOSS_BEND * (2.0 * ((1.0 + z * z).sqrt() - 1.0)).sqrt().copysign(residual)
+}
+
+fn scale_of(model: &JointModel, series: Series, datasets: &[Dataset]) -> f64 {
+    let all = || datasets.iter().flat_map(|d| d.measured.iter().filter(|(s, _)| *s == series).map(|(_, v)| v));
+    let spread = |values: &Vec<f64>| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
+    };
+    let variance = all().map(spread).fold(0.0, f64::max);
+    let sensors = &model.parameters.sensors;
+    match series {
+        Series::Guide => {
+            // Of the torque of the motor at the current for which its supply is good: what a gear loses unnoticed.
+            let torque = model.parameters.motor.map_or(1.0, |m| {
+                m.torque_constant_nm_per_a * m.gear_ratio * m.supply_v / m.resistance_ohm
+            });
+            0.0015 * torque
+        }
+        Series::Channel(channel) => {
+            let quantum = all().filter_map(|v| quantum_of(v)).fold(0.0, f64::max);
+            let (noise, floor) = match channel {
+                Channel::F1 | Channel::F2 | Channel::F3 | Channel::F4 => (sensors.tension_noise_n, MODEL_FLOOR),
+                Channel::MotorCurrent => (sensors.current_noise_a, MODEL_FLOOR),
+                Channel::ThetaIn | Channel::ThetaOut | Channel::ThetaMotor => (0.0, ANGLE_FLOOR),
+                _ => (0.0, MODEL_FLOOR),
+            };
+            (noise * noise + quantum * quantum / 12.0 + floor * floor * variance).sqrt().max(f64::MIN_POSITIVE)
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Levenberg–Marquardt on the replay residuals.
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::storage::Owned;
+use nalgebra::{DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+
+use super::free::Free;
+use super::objective::{Objective, Part, Residuals, soft};
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
+
+/// Step of the difference quotients in the optimiser's coordinate: large against the roughness that stick and slip leave
+/// in the residuals, small against their curvature.
+const DIFFERENCE_STEP: f64 = 2e-3;
+
+/// Result of a fit.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Model with the fitted values.
+    pub model: JointModel,
+    /// Fitted values.
+    pub values: Vec<f64>,
+    /// Their standard deviations; `None` for a value at a bound.
+    pub stds: Vec<Option<f64>>,
+    /// Residuals of the fitted model.
+    pub residuals: Residuals,
+    /// Slopes of the weighted residuals over the optimiser's coordinates, training rows only.
+    pub jacobian: DMatrix<f64>,
+}
+
+struct Problem<'a> {
+    objective: &'a Objective,
+    model: &'a JointModel,
+    free: &'a [Free],
+    fixed: &'a [bool],
+    x: DVector<f64>,
+    current: Option<Residuals>,
+}
+
+impl Problem<'_> {
+    fn model_at(&self, x: &DVector<f64>) -> JointModel {
+        let mut model = self.model.clone();
+        for (free, x) in self.free.iter().zip(x.iter()) {
+            free.apply(*x, &mut model);
+        }
+        model
+    }
+
+    fn residuals_at(&self, x: &DVector<f64>) -> Option<Residuals> {
+        self.objective.residuals(&self.model_at(x)).ok().filter(|r| r.values.iter().all(|v| v.is_finite()))
+    }
+
+    /// Weighted training residuals followed by the priors.
+    fn weighted(&self, residuals: &Residuals, x: &DVector<f64>) -> DVector<f64> {
+        let mut rows = training_rows(self.objective, residuals);
+        rows.extend(self.free.iter().zip(x.iter()).map(|(free, x)| free.prior_residual(*x)));
+        DVector::from_vec(rows)
+    }
+}
+
+/// Training residuals after the soft loss. Neighbouring blocks tell nearly the same: their weight is that of one block
+/// in ten, which keeps priors and standard deviations honest.
+fn training_rows(objective: &Objective, residuals: &Residuals) -> Vec<f64> {
+    let weight = CORRELATED_BLOCKS.sqrt().recip();
+    objective
+        .entries()
+        .zip(&residuals.values)
+        .filter(|((_, _, block), _)| block.part == Part::Training)
+        .map(|(_, value)| weight * soft(*value))
+        .collect()
+}
+
+/// Blocks over which the residuals of a real bench stay alike, 0.1 s: the time in which a front crosses a sheath.
+const CORRELATED_BLOCKS: f64 = 10.0;
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        self.x.copy_from(x);
+        self.current = self.residuals_at(x);
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.x.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        self.current.as_ref().map(|residuals| self.weighted(residuals, &self.x))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let here = self.weighted(self.current.as_ref()?, &self.x);
+        let columns: Option<Vec<DVector<f64>>> = (0..self.free.len())
+            .into_par_iter()
+            .map(|j| {
+                if self.fixed[j] {
+                    return Some(DVector::zeros(here.len()));
+                }
+                let free = &self.free[j];
+                // Step away from the nearer bound.
+                let ahead = free.value_at(self.x[j] + DIFFERENCE_STEP);
+                let step = if free.at_bound(ahead) { -DIFFERENCE_STEP } else { DIFFERENCE_STEP };
+                let mut x = self.x.clone();
+                x[j] += step;
+                let there = self.weighted(&self.residuals_at(&x)?, &x);
+                Some((there - &here) / step)
+            })
+            .collect();
+        Some(DMatrix::from_columns(&columns?))
+    }
+}
+
+/// Fits the free parameters of `model` to the training part.
+///
+/// A parameter that runs into a bound is kept there and the others are fitted again.
+///
+/// # Errors
+/// When the model cannot be driven.
+pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience: usize) -> Result<Solution, Failure> {
+    // Checks once that the model can be simulated at all; inside the optimiser an error could not be told.
+    let start = objective.residuals(model)?;
+    if free.is_empty() {
+        return Ok(Solution {
+            model: model.clone(),
+            values: Vec::new(),
+            stds: Vec::new(),
+            residuals: start,
+            jacobian: DMatrix::zeros(0, 0),
+        });
+    }
+    let mut fixed = vec![false; free.len()];
+    let mut x = DVector::zeros(free.len());
+    for _ in 0..2 {
+        let mut problem = Problem { objective, model, free, fixed: &fixed, x: x.clone(), current: None };
+        problem.set_params(&x);
+        let optimiser = LevenbergMarquardt::new()
+            .with_patience(patience)
+            .with_stepbound(0.5)
+            .with_ftol(1e-5)
+            .with_xtol(1e-4)
+            .with_gtol(1e-6);
+        let (problem, _report) = optimiser.minimize(problem);
+        x = problem.x;
+        let mut newly = false;
+        for (j, free) in free.iter().enumerate() {
+            if !fixed[j] && free.at_bound(free.value_at(x[j])) {
+                fixed[j] = true;
+                newly = true;
+            }
+        }
+        if !newly || fixed.iter().all(|f| *f) {
+            break;
+        }
+    }
+    let mut problem = Problem { objective, model, free, fixed: &fixed, x: x.clone(), current: None };
+    problem.set_params(&x);
+    let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
+    let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
+    let rows = problem.residuals().unwrap_or_else(|| DVector::zeros(0));
+    let variance = (rows.norm_squared() / (rows.len() as f64 / CORRELATED_BLOCKS - free.len() as f64).max(1.0)).max(1e-300);
+    let stds = standard_deviations(&jacobian, &fixed)
+        .into_iter()
+        .zip(free.iter().zip(&values))
+        .map(|(std, (free, value))| std.map(|s| s * variance.sqrt() * free.slope_at(*value)))
+        .collect();
+    let model = problem.model_at(&x);
+    let residuals = match problem.current.take() {
+        Some(residuals) => residuals,
+        None => objective.residuals(&model)?,
+    };
+    Ok(Solution { model, values, stds, residuals, jacobian })
+}
+
+/// Square roots of the diagonal of `(JᵀJ)⁻¹`.
+fn standard_deviations(jacobian: &DMatrix<f64>, fixed: &[bool]) -> Vec<Option<f64>> {
+    let open: Vec<usize> = (0..fixed.len()).filter(|j| !fixed[*j]).collect();
+    let columns: Vec<_> = open.iter().map(|j| jacobian.column(*j).into_owned()).collect();
+    let mut stds = vec![None; fixed.len()];
+    if columns.is_empty() || jacobian.nrows() == 0 {
+        return stds;
+    }
+    let reduced = DMatrix::from_columns(&columns);
+    if let Some(inverse) = (reduced.transpose() * &reduced).try_inverse() {
+        for (position, j) in open.iter().enumerate() {
+            stds[*j] = Some(inverse[(position, position)].max(0.0).sqrt());
+        }
+    }
+    stds
+}

@@ -1,0 +1,137 @@
+//! How a command ends: exit status and the one line that explains it.
+
+use std::fmt::{self, Display};
+
+/// Class of a failure; it decides the exit status.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureClass {
+    /// The work itself did not succeed: exit status 1.
+    Failed,
+    /// Bad usage or unusable input: exit status 2.
+    BadInput,
+}
+
+/// Why a command could not do its work: one line that says what, where and what to do.
+///
+/// Line breaks and other control characters, which may come from a file or its name, are shown escaped, so that
+/// the message stays one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct Failure {
+    class: FailureClass,
+    message: String,
+}
+
+impl Failure {
+    /// The work did not succeed although the input was usable.
+    pub fn failed(message: impl Display) -> Self {
+        Self { class: FailureClass::Failed, message: one_line(&message) }
+    }
+
+    /// Bad usage or unusable input.
+    pub fn bad_input(message: impl Display) -> Self {
+        Self { class: FailureClass::BadInput, message: one_line(&message) }
+    }
+
+    /// Class, and with it the exit status.
+    pub fn class(&self) -> FailureClass {
+        self.class
+    }
+
+    /// What is wrong, one line.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+}
+
+/// How a command ended that did its work.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    notes: Vec<String>,
+}
+
+impl Outcome {
+    /// Done, with nothing to add.
+    pub fn done() -> Self {
+        Self::default()
+    }
+
+    /// Adds what was lost or repaired on the way, one line each.
+    pub fn extend<S: Display>(&mut self, notes: impl IntoIterator<Item = S>) {
+        self.notes.extend(notes.into_iter().map(|note| one_line(&note)));
+    }
+
+    /// What was lost or repaired.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+/// Exit status of a process; the only place that knows the numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExitStatus {
+    /// Done.
+    Done = 0,
+    /// Failed.
+    Failed = 1,
+    /// Bad usage or unusable input.
+    BadInput = 2,
+    /// Done, but something was lost or repaired.
+    DoneWithNotes = 3,
+}
+
+impl From<&Result<Outcome, Failure>> for ExitStatus {
+    fn from(result: &Result<Outcome, Failure>) -> Self {
+        match result {
+            Ok(outcome) if outcome.notes.is_empty() => Self::Done,
+            Ok(_) => Self::DoneWithNotes,
+            Err(failure) => match failure.class {
+                FailureClass::Failed => Self::Failed,
+                FailureClass::BadInput => Self::BadInput,
+            },
+        }
+    }
+}
+
+impl From<ExitStatus> for std::process::ExitCode {
+    fn from(status: ExitStatus) -> Self {
+        Self::from(status as u8)
+    }
+}
+
+/// The text with line breaks and control characters escaped.
+pub fn one_line(text: &impl fmt::Display) -> String {
+    let text = text.to_string();
+    if !text.contains(char::is_control) {
+        return text;
+    }
+    text.chars()
+        .map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_stay_one_line_whatever_a_file_is_called() {
+        let failure = Failure::bad_input("a\nb\u{1b}[31m.csv: empty");
+        assert_eq!(failure.message(), "a\\nb\\u{1b}[31m.csv: empty");
+    }
+
+    #[test]
+    fn exit_status_follows_class_and_notes() {
+        let mut noted = Outcome::done();
+        noted.extend(["the last line was dropped"]);
+        let cases = [
+            (Ok(Outcome::done()), 0),
+            (Err(Failure::failed("x")), 1),
+            (Err(Failure::bad_input("x")), 2),
+            (Ok(noted), 3),
+        ];
+        for (result, expected) in cases {
+            assert_eq!(ExitStatus::from(&result) as u8, expected, "{result:?}");
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! Recordings in MCAP: one JSON message a sample on one topic.
+//!
+//! A message on [`TOPIC`] is an object with one property a column, `t_s` among them; the schema names them in
+//! order. `log_time` is `t_s` in nanoseconds from an epoch of 0, for players that sort by it; what counts is the
+//! property, which keeps every bit. Messages on other topics are passed over: they take no part in anything and are
+//! not copied when the recording is written elsewhere, which [`Recording::topics_passed_over`] tells.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::io::{self, Read, Seek, Write};
+
+use mcap::sans_io::LinearReaderOptions;
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, Visitor};
+use serde_json::value::RawValue;
+
+use super::build::Table;
+use super::place::Places;
+use super::{Column, Origin, ReadOptions, Recording, TIME_ROLE};
+use crate::outcome::Failure;
+
+/// Topic of the samples.
+pub const TOPIC: &str = "/bowden/samples";
+
+/// Name of the schema of a sample.
+const SCHEMA: &str = "bowden.Sample";
+
+/// Largest record that is read, bytes; a length beyond it is damage.
+const RECORD_LIMIT: usize = 1 << 28;
+
+/// Reads the samples as they stream past.
+pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Result<Recording, Failure> {
+    let reader_options = LinearReaderOptions::default().with_record_length_limit(RECORD_LIMIT);
+    let messages = mcap::io::MessageReader::new_with_options(data, reader_options);
+    let mut origin =
+        Origin { source, places: Places::messages(), notes: Vec::new(), passed_over: Vec::new() };
+    let mut other_topics = BTreeSet::new();
+    let mut table: Option<Table> = None;
+    let mut number = 0;
+    for message in messages {
+        let message = match message {
+            Ok(message) => message,
+            Err(mcap::McapError::UnexpectedEof) if table.is_some() => {
+                origin.notes.push(format!(
+                    "{}: the file ends early; the {number} whole samples before the end were used",
+                    origin.source
+                ));
+                break;
+            }
+            Err(error) => {
+                return Err(Failure::bad_input(format!(
+                    "{}: after message {number}: {error}; copy or record the file again",
+                    origin.source
+                )));
+            }
+        };
+        if message.channel.topic != TOPIC {
+            if !other_topics.contains(&message.channel.topic) {
+                other_topics.insert(message.channel.topic.clone());
+            }
+            continue;
+        }
+        number += 1;
+        let refuse = |reason: String| {
+            Failure::bad_input(format!("{}: {reason}", origin.places.describe_number(&origin.source, number)))
+        };
+        let encoding = &message.channel.message_encoding;
+        if encoding != "json" {
+            return Err(refuse(format!(
+                "topic {TOPIC} is encoded as `{encoding}`, expected json; convert it"
+            )));
+        }
+        let row: Row = serde_json::from_slice(&message.data)
+            .map_err(|error| refuse(format!("not a JSON object: {error}; record again")))?;
+        let cells = row.cells().map_err(&refuse)?;
+        let table = if let Some(table) = &mut table {
+            table
+        } else {
+            let names: Vec<&str> = row.names().collect();
+            table.insert(Table::from_header(&names, options).map_err(&refuse)?)
+        };
+        let sample = table.len();
+        row.push_to(&cells, table).map_err(&refuse)?;
+        origin.places.push(sample, number);
+    }
+    origin.passed_over = other_topics.into_iter().collect();
+    if let Some(table) = table {
+        return origin.finish(table);
+    }
+    let others = match origin.passed_over.as_slice() {
+        [] => "no message at all".to_owned(),
+        topics => topics.join(", "),
+    };
+    Err(Failure::bad_input(format!(
+        "{}: no message on topic {TOPIC}; the file has {others}; convert a table with `bowden convert`",
+        origin.source
+    )))
+}
+
+/// One message: properties in their order, values as they are written.
+struct Row<'m>(Vec<(Cow<'m, str>, &'m RawValue)>);
+
+impl<'m> Row<'m> {
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(|(name, _)| name.as_ref())
+    }
+
+    /// Text of every value, strings without their quotes.
+    fn cells(&self) -> Result<Vec<Cow<'m, str>>, String> {
+        self.0
+            .iter()
+            .map(|(name, value)| {
+                let value = value.get();
+                if value.starts_with('"') {
+                    serde_json::from_str(value)
+                        .map(Cow::Owned)
+                        .map_err(|error| format!("property `{name}`: {error}; record again"))
+                } else {
+                    Ok(Cow::Borrowed(value))
+                }
+            })
+            .collect()
+    }
+
+    /// Adds the cells in the order of the first message.
+    fn push_to(&self, cells: &[Cow<str>], table: &mut Table) -> Result<(), String> {
+        if self.names().eq(table.names()) {
+            return table.push(cells.iter().map(|cell| cell.as_bytes()));
+        }
+        let given: BTreeMap<&str, &Cow<str>> = self.names().zip(cells).collect();
+        let mut row = Vec::with_capacity(table.width());
+        for name in table.names() {
+            let cell = given.get(name.as_str()).ok_or_else(|| {
+                format!("no property `{name}`, which the first message has; record it always or never")
+            })?;
+            row.push(cell.as_bytes());
+        }
+        if self.0.len() != table.width() {
+            let (got, expected) = (self.0.len(), table.width());
+            return Err(format!(
+                "{got} properties, expected {expected} as in the first message; record again"
+            ));
+        }
+        table.push(row.into_iter())
+    }
+}
+
+#[derive(Deserialize)]
+struct Name<'m>(#[serde(borrow)] Cow<'m, str>);
+
+impl<'de> Deserialize<'de> for Row<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Rows;
+        impl<'de> Visitor<'de> for Rows {
+            type Value = Row<'de>;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+                formatter.write_str("an object with one property a column")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Row<'de>, A::Error> {
+                let mut properties = Vec::with_capacity(16);
+                while let Some((Name(name), value)) = map.next_entry::<Name, &RawValue>()? {
+                    properties.push((name, value));
+                }
+                Ok(Row(properties))
+            }
+        }
+        deserializer.deserialize_map(Rows)
+    }
+}
+
+/// Writes one message a sample.
+pub(super) fn write(recording: &Recording, out: impl Write + Seek) -> io::Result<()> {
+    let library = concat!("bowden ", env!("CARGO_PKG_VERSION"));
+    let mut writer = mcap::WriteOptions::new().profile("").library(library).create(out).map_err(io_error)?;
+    let schema = writer.add_schema(SCHEMA, "jsonschema", &schema_of(recording)).map_err(io_error)?;
+    let channel = writer.add_channel(schema, TOPIC, "json", &BTreeMap::new()).map_err(io_error)?;
+    let names: Vec<String> =
+        recording.columns().iter().map(|column| serde_json::Value::from(column.name()).to_string()).collect();
+    let mut data = Vec::with_capacity(512);
+    for (sample, t_s) in recording.t_s().iter().enumerate() {
+        data.clear();
+        write!(data, "{{\"{TIME_ROLE}\":{t_s:?}")?;
+        for (name, column) in names.iter().zip(recording.columns()) {
+            write!(data, ",{name}:")?;
+            match column {
+                Column::Known { values, .. } => write!(data, "{:?}", values[sample])?,
+                Column::Unknown(text) => write_text(&mut data, text.cell(sample).unwrap_or_default())?,
+            }
+        }
+        data.push(b'}');
+        // Casts saturate: a time before the epoch is logged at the epoch, and the property keeps it.
+        let log_time = (t_s * 1e9).round() as u64;
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: sample as u32,
+            log_time,
+            publish_time: log_time,
+        };
+        writer.write_to_known_channel(&header, &data).map_err(io_error)?;
+    }
+    writer.finish().map_err(io_error)?;
+    Ok(())
+}
+
+fn io_error(error: mcap::McapError) -> io::Error {
+    match error {
+        mcap::McapError::Io(error) => error,
+        error => io::Error::other(error),
+    }
+}
+
+/// A cell that is not interpreted: a JSON value if it is one letter for letter, else a string.
+fn write_text(data: &mut Vec<u8>, cell: &str) -> io::Result<()> {
+    match serde_json::from_str::<&RawValue>(cell) {
+        Ok(value) if value.get() == cell && !cell.starts_with('"') => data.extend_from_slice(cell.as_bytes()),
+        _ => serde_json::to_writer(data, cell)?,
+    }
+    Ok(())
+}
+
+fn schema_of(recording: &Recording) -> Vec<u8> {
+    let mut properties = serde_json::Map::new();
+    properties
+        .insert(TIME_ROLE.to_owned(), serde_json::json!({ "type": "number", "description": "time, s" }));
+    for column in recording.columns() {
+        let schema = match column {
+            Column::Known { channel, .. } => {
+                serde_json::json!({ "type": "number", "description": channel.unit() })
+            }
+            Column::Unknown(_) => serde_json::json!({}),
+        };
+        properties.insert(column.name().to_owned(), schema);
+    }
+    let schema = serde_json::json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": SCHEMA,
+        "type": "object",
+        "properties": properties,
+    });
+    schema.to_string().into_bytes()
+}

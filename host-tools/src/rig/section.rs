@@ -1,0 +1,193 @@
+//! Access to a TOML table that knows where every key and value stands.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::outcome::Failure;
+
+/// A value and where it stands.
+pub(super) type Located<'t> = Spanned<DeValue<'t>>;
+
+/// A string and where it stands.
+pub(super) type LocatedStr<'t> = (&'t str, Range<usize>);
+
+/// Text of a rig file under its name.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'t> {
+    pub(super) name: &'t str,
+    pub(super) text: &'t str,
+}
+
+impl Source<'_> {
+    /// A failure at a byte range, as `file:line:column: reason`; column counts characters from 1.
+    pub(super) fn at(&self, span: &Range<usize>, reason: impl std::fmt::Display) -> Failure {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
+        Failure::bad_input(format!("{}:{line}:{column}: {reason}", self.name))
+    }
+}
+
+/// An accepted range.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds<'t> {
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    pub(super) unit: &'t str,
+}
+
+/// One table of a rig file.
+#[derive(Clone)]
+pub(super) struct Section<'t> {
+    pub(super) source: Source<'t>,
+    /// Name as in the file, dots included; empty for the file itself.
+    pub(super) name: &'t str,
+    /// Where the table begins.
+    pub(super) span: Range<usize>,
+    table: &'t DeTable<'t>,
+}
+
+impl<'t> Section<'t> {
+    pub(super) fn new(source: Source<'t>, name: &'t str, span: Range<usize>, table: &'t DeTable<'t>) -> Self {
+        Self { source, name, span, table }
+    }
+
+    /// The value of a key.
+    pub(super) fn get(&self, key: &str) -> Option<&'t Located<'t>> {
+        self.table.get(key)
+    }
+
+    /// Keys with their place and value.
+    pub(super) fn entries(&self) -> impl Iterator<Item = (&'t str, Range<usize>, &'t Located<'t>)> {
+        self.table.iter().map(|(key, value)| (key.get_ref().as_ref(), key.span(), value))
+    }
+
+    /// Refuses the first key that is none of `known`.
+    pub(super) fn refuse_unknown<'k>(
+        &self,
+        kind: &str,
+        known: impl IntoIterator<Item = &'k str>,
+    ) -> Result<(), Failure> {
+        let known: Vec<&str> = known.into_iter().collect();
+        let Some((key, span, _)) = self.entries().find(|(key, ..)| !known.contains(key)) else {
+            return Ok(());
+        };
+        let within = if self.name.is_empty() { String::new() } else { format!(" in [{}]", self.name) };
+        Err(self.source.at(&span, format!("unknown {kind} `{key}`{within}; {}", advice(key, known))))
+    }
+
+    /// A failure that lacks a key.
+    pub(super) fn lacks(&self, key: &str, meaning: &str) -> Failure {
+        self.source.at(&self.span, format!("[{}] lacks `{key}` ({meaning}); add it", self.name))
+    }
+
+    /// A failure on the type of a value.
+    pub(super) fn wrong_type(&self, key: &str, value: &Located, expected: &str) -> Failure {
+        let got = kind_of(value.get_ref());
+        let key = self.path(key);
+        self.source.at(&value.span(), format!("{key}: got {got}, expected {expected}; correct it"))
+    }
+
+    /// Name of a key with its section.
+    pub(super) fn path(&self, key: &str) -> String {
+        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
+    }
+
+    /// A sub-table.
+    pub(super) fn section(&self, key: &str, name: &'t str) -> Result<Option<Section<'t>>, Failure> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        match value.get_ref() {
+            DeValue::Table(table) => Ok(Some(Section::new(self.source, name, value.span(), table))),
+            _ => Err(self.wrong_type(key, value, "a table")),
+        }
+    }
+
+    /// A number within its range.
+    pub(super) fn number(&self, key: &str, bounds: Bounds) -> Result<Option<f64>, Failure> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64)
+            }
+            _ => None,
+        };
+        let number = number.ok_or_else(|| self.wrong_type(key, value, "a number"))?;
+        // Written so that NaN is refused too.
+        if !(number >= bounds.lower && number <= bounds.upper) {
+            let Bounds { lower, upper, unit } = bounds;
+            let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+            let key = self.path(key);
+            return Err(self.source.at(
+                &value.span(),
+                format!("{key}: got {number}, allowed {lower} to {upper}{unit}; check value and unit"),
+            ));
+        }
+        Ok(Some(number))
+    }
+
+    /// A whole number within its range.
+    pub(super) fn integer(&self, key: &str, lower: u32, upper: u32) -> Result<Option<u32>, Failure> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let DeValue::Integer(integer) = value.get_ref() else {
+            return Err(self.wrong_type(key, value, "a whole number"));
+        };
+        match u32::from_str_radix(integer.as_str(), integer.radix()) {
+            Ok(number) if (lower..=upper).contains(&number) => Ok(Some(number)),
+            _ => Err(self.source.at(
+                &value.span(),
+                format!("{}: got {integer}, allowed {lower} to {upper}; correct it", self.path(key)),
+            )),
+        }
+    }
+
+    /// A string and where it stands.
+    pub(super) fn string(&self, key: &str) -> Result<Option<LocatedStr<'t>>, Failure> {
+        self.get(key).map(|value| self.as_string(key, value)).transpose()
+    }
+
+    /// A list of strings and where they stand.
+    pub(super) fn strings(&self, key: &str) -> Result<Option<Vec<LocatedStr<'t>>>, Failure> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let DeValue::Array(array) = value.get_ref() else {
+            return Err(self.wrong_type(key, value, "a list of strings"));
+        };
+        array.iter().map(|value| self.as_string(key, value)).collect::<Result<_, _>>().map(Some)
+    }
+
+    fn as_string(&self, key: &str, value: &'t Located<'t>) -> Result<LocatedStr<'t>, Failure> {
+        match value.get_ref() {
+            DeValue::String(text) => Ok((text.as_ref(), value.span())),
+            _ => Err(self.wrong_type(key, value, "a string")),
+        }
+    }
+}
+
+/// What to do about an unknown name: the nearest known one, or all of them.
+pub(super) fn advice<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> String {
+    const NEAR: f64 = 0.8;
+    let mut known: Vec<&str> = known.into_iter().collect();
+    let nearness = |candidate: &str| strsim::jaro_winkler(&name.to_lowercase(), candidate);
+    let nearest = known.iter().copied().max_by(|a, b| nearness(a).total_cmp(&nearness(b)));
+    match nearest {
+        Some(nearest) if nearness(nearest) >= NEAR => format!("did you mean `{nearest}`?"),
+        _ => {
+            known.sort_unstable();
+            format!("expected one of {}", known.join(", "))
+        }
+    }
+}
+
+fn kind_of(value: &DeValue) -> String {
+    match value {
+        DeValue::String(text) => format!("the string \"{text}\""),
+        DeValue::Integer(integer) => format!("the whole number {integer}"),
+        DeValue::Float(float) => format!("the number {float}"),
+        DeValue::Boolean(flag) => format!("{flag}"),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::Array(_) => "a list".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}

@@ -1,0 +1,324 @@
+//! A replay: the joint driven by what a recording says went in, sampled where the recording was.
+//!
+//! With a motor and a recorded duty the motor itself is simulated, and a torque guides its angle to the recorded one:
+//! stiff enough to follow, soft enough that what an encoder cannot resolve comes from the physics. A first pass finds
+//! the guiding torque; its slow part, filtered without phase, is what friction or a wrong parameter took from the
+//! motor, and the second pass applies it ahead so that the guide itself can be soft. The guide pulls only where the
+//! simulated angle leaves the uncertainty of the reconstructed one.
+//!
+//! Compared with a prescribed low-passed angle this lets the input pulley give way to the load as the real one does;
+//! `cargo xtask bench` prints what that gains.
+
+use bowden_model::channel::Channel;
+use bowden_model::drive::BridgeInput;
+use bowden_model::effect::SensorPort;
+use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
+use bowden_model::plant::{Plant, PlantConfig, StepInput};
+
+use crate::joint_model::{Drive, JointModel};
+use crate::outcome::Failure;
+use crate::reconstruct::{Motion, moving_average};
+use crate::recording::Recording;
+
+/// Stiffness of the guide in the first pass, N·m/rad: five times that of a joint of this size, so that the angle follows.
+const STIFF_GUIDE_NM_PER_RAD: f64 = 150.0;
+
+/// Stiffness of the guide in the second pass, N·m/rad.
+const SOFT_GUIDE_NM_PER_RAD: f64 = 50.0;
+
+/// Part of the angle's standard deviation within which the guide does not pull.
+const GUIDE_DEAD_BAND: f64 = 0.3;
+
+/// Half width of the zero-phase filter of the guiding torque, s.
+const GUIDE_FILTER_S: f64 = 0.03;
+
+/// Inputs of a replay, prepared once and used for every set of parameters.
+#[derive(Clone, Debug)]
+pub struct ReplayInput {
+    t_s: Vec<f64>,
+    motion: Option<Motion>,
+    duty: Option<Vec<f64>>,
+    bus_v: Option<Vec<f64>>,
+    enabled: Option<Vec<f64>>,
+    theta_ref_rad: Option<Vec<f64>>,
+    torque_out_nm: Option<Vec<f64>>,
+    start_rad: Option<f64>,
+    start_rad_s: f64,
+}
+
+impl ReplayInput {
+    /// Takes time and the input roles of `model` from a recording, and nothing else.
+    ///
+    /// # Errors
+    /// When an input role is missing.
+    pub fn new(model: &JointModel, recording: &Recording) -> Result<Self, Failure> {
+        let take = |channel: Channel| -> Result<Option<Vec<f64>>, Failure> {
+            if !model.inputs.contains(&channel) {
+                return Ok(None);
+            }
+            recording.channel(channel).map(|values| Some(values.to_vec())).ok_or_else(|| {
+                Failure::bad_input(format!(
+                    "{}: no column for the input {}; map one in [recording.columns] or leave it out of replay.inputs",
+                    recording.source(),
+                    channel.role()
+                ))
+            })
+        };
+        let t_s = recording.t_s().to_vec();
+        let motion = take(Channel::ThetaIn)?.map(|theta| Motion::from_encoder(&t_s, &theta));
+        let duty = take(Channel::Duty)?;
+        let theta_ref_rad = take(Channel::ThetaRef)?;
+        let start_rad = motion.as_ref().map(|m| m.theta_rad[0]);
+        Ok(Self {
+            motion,
+            duty,
+            bus_v: take(Channel::BusVoltage)?,
+            enabled: take(Channel::DriveEnable)?,
+            theta_ref_rad,
+            torque_out_nm: take(Channel::TorqueOut)?,
+            start_rad,
+            start_rad_s: 0.0,
+            t_s,
+        })
+    }
+
+    /// States where the joint stands and how it moves at the first sample, for joints whose angle is not an input.
+    pub fn start_at(&mut self, theta_rad: f64, omega_rad_s: f64) {
+        self.start_rad = Some(theta_rad);
+        self.start_rad_s = omega_rad_s;
+    }
+
+    /// Sampling instants, s.
+    #[must_use]
+    pub fn t_s(&self) -> &[f64] {
+        &self.t_s
+    }
+
+    /// Reconstructed motion of the input pulley, if it is an input.
+    #[must_use]
+    pub fn motion(&self) -> Option<&Motion> {
+        self.motion.as_ref()
+    }
+}
+
+/// Predicted channels, one value a sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prediction {
+    channels: Vec<(Channel, Vec<f64>)>,
+    /// Torque that guided the motor, N·m at the input pulley; what its model does not explain. Empty where none was
+    /// needed.
+    pub guide_nm: Vec<f64>,
+}
+
+impl Prediction {
+    /// One channel.
+    #[must_use]
+    pub fn channel(&self, channel: Channel) -> Option<&[f64]> {
+        self.channels.iter().find(|(c, _)| *c == channel).map(|(_, values)| values.as_slice())
+    }
+
+    /// All channels.
+    pub fn channels(&self) -> impl Iterator<Item = (Channel, &[f64])> {
+        self.channels.iter().map(|(channel, values)| (*channel, values.as_slice()))
+    }
+}
+
+/// Simulates the joint with the inputs of a recording.
+///
+/// # Errors
+/// When the model cannot be driven by these inputs.
+pub fn replay(model: &JointModel, input: &ReplayInput) -> Result<Prediction, Failure> {
+    let config = model.plant()?;
+    let drive = model.drive()?;
+    let run = Run { model, config: &config, input, drive };
+    if drive == Drive::GuidedMotor {
+        let no_torque = vec![0.0; input.t_s.len()];
+        let first = run.execute(Guide { stiffness_nm_per_rad: STIFF_GUIDE_NM_PER_RAD, ahead_nm: &no_torque });
+        let mut ahead_nm = first.guide_nm;
+        let half = (GUIDE_FILTER_S / median_step_s(&input.t_s)).round() as usize;
+        for _ in 0..2 {
+            ahead_nm = moving_average(&ahead_nm, half);
+        }
+        return Ok(run.execute(Guide { stiffness_nm_per_rad: SOFT_GUIDE_NM_PER_RAD, ahead_nm: &ahead_nm }));
+    }
+    Ok(run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }))
+}
+
+fn median_step_s(t_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.is_empty() {
+        return 1e-3;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[derive(Clone, Copy)]
+struct Guide<'a> {
+    stiffness_nm_per_rad: f64,
+    ahead_nm: &'a [f64],
+}
+
+struct Run<'a> {
+    model: &'a JointModel,
+    config: &'a PlantConfig,
+    input: &'a ReplayInput,
+    drive: Drive,
+}
+
+impl Run<'_> {
+    fn execute(&self, guide: Guide<'_>) -> Prediction {
+        let input = self.input;
+        let n = input.t_s.len();
+        let longest_s = self.model.step_s.min(self.config.stable_step_s());
+        let effects = self.config.effects();
+        let theta_in = input.motion.as_ref().map(|m| corrected(effects, Channel::ThetaIn, &input.t_s, &m.theta_rad));
+        let start_rad = theta_in.as_ref().map(|t| t[0]).or(input.start_rad).unwrap_or(0.0);
+        let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
+        plant.set_time_s(input.t_s.first().copied().unwrap_or(0.0));
+        if self.drive == Drive::Duty || self.drive == Drive::Servo {
+            plant.set_speed_rad_s(input.start_rad_s);
+        }
+        plant.settle(self.config, &self.step_input(0, start_rad));
+        let mut sampler = Sampler::new(self.model, effects, n);
+        let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
+        let mut guide_nm = Vec::with_capacity(if self.drive == Drive::GuidedMotor { n } else { 0 });
+        for k in 0..n {
+            let mut torque_sum = 0.0;
+            if k > 0 {
+                let span_s = input.t_s[k] - input.t_s[k - 1];
+                let steps = (span_s / longest_s - 1e-9).ceil().max(1.0);
+                let dt_s = span_s / steps;
+                for sub in 1..=steps as usize {
+                    let share = sub as f64 / steps;
+                    let wanted = theta_in.as_ref().map_or(0.0, |t| t[k - 1] + (t[k] - t[k - 1]) * share);
+                    let mut step = self.step_input(k - 1, wanted);
+                    match self.drive {
+                        Drive::GuidedMotor => {
+                            let band =
+                                input.motion.as_ref().map_or(0.0, |m| GUIDE_DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
+                            let error = plant.theta_in_rad() - wanted;
+                            let beyond = error - error.clamp(-band, band);
+                            step.input_torque_nm = guide.ahead_nm[k] - guide.stiffness_nm_per_rad * beyond;
+                            torque_sum += step.input_torque_nm / steps;
+                        }
+                        Drive::Servo => {
+                            if let (Some(servo), Some(reference)) = (self.model.servo, &input.theta_ref_rad) {
+                                let error = reference[k - 1] - delayed.at(plant.t_s(), plant.theta_in_rad());
+                                step.bridge.duty = (servo.gain_duty_per_rad * error)
+                                    .clamp(-servo.duty_limit, servo.duty_limit);
+                            }
+                        }
+                        Drive::Angle | Drive::Duty => {}
+                    }
+                    plant.step(self.config, &step, dt_s);
+                }
+            }
+            if self.drive == Drive::GuidedMotor {
+                guide_nm.push(torque_sum);
+            }
+            sampler.sample(self.config, &plant, input.t_s[k], if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] });
+        }
+        Prediction { channels: sampler.channels, guide_nm }
+    }
+
+    fn ratio(&self) -> f64 {
+        self.model.parameters.pulleys.map_or(1.0, |p| p.input_radius_m / p.output_radius_m)
+    }
+
+    fn step_input(&self, k: usize, theta_in_rad: f64) -> StepInput {
+        let input = self.input;
+        let at = |values: &Option<Vec<f64>>, otherwise: f64| values.as_ref().map_or(otherwise, |v| v[k]);
+        StepInput {
+            bridge: BridgeInput {
+                duty: at(&input.duty, 0.0),
+                bus_v: at(&input.bus_v, self.model.parameters.motor.map_or(0.0, |m| m.supply_v)),
+                enabled: at(&input.enabled, 1.0) > 0.5,
+            },
+            theta_in_rad,
+            theta_out_rad: 0.0,
+            input_torque_nm: 0.0,
+            // The recorded torque is that of the cables on the joint; the load answers with its negative.
+            external_torque_nm: -at(&input.torque_out_nm, 0.0),
+        }
+    }
+}
+
+/// Angle as it was a fixed time ago.
+struct DelayLine {
+    delay_s: f64,
+    history: std::collections::VecDeque<(f64, f64)>,
+    last: f64,
+}
+
+impl DelayLine {
+    fn new(delay_s: f64, start: f64) -> Self {
+        Self { delay_s, history: std::collections::VecDeque::new(), last: start }
+    }
+
+    fn at(&mut self, t_s: f64, value: f64) -> f64 {
+        if self.delay_s <= 0.0 {
+            return value;
+        }
+        self.history.push_back((t_s, value));
+        while let Some(&(then_s, old)) = self.history.front() {
+            if then_s > t_s - self.delay_s {
+                break;
+            }
+            self.last = old;
+            self.history.pop_front();
+        }
+        self.last
+    }
+}
+
+/// What the sensors would have shown had they no noise and no steps.
+struct Sampler<'a> {
+    effects: &'a EffectSet,
+    channels: Vec<(Channel, Vec<f64>)>,
+    states: Vec<EffectStates>,
+}
+
+impl<'a> Sampler<'a> {
+    fn new(model: &JointModel, effects: &'a EffectSet, samples: usize) -> Self {
+        let channels: Vec<_> = model.outputs.iter().map(|c| (*c, Vec::with_capacity(samples))).collect();
+        let states = vec![FRESH_STATES; channels.len()];
+        Self { effects, channels, states }
+    }
+
+    fn sample(&mut self, config: &PlantConfig, plant: &Plant, t_s: f64, dt_s: f64) {
+        let [f1, f2, f3, f4] = plant.end_tensions_n(config);
+        for ((channel, values), states) in self.channels.iter_mut().zip(&mut self.states) {
+            let value = match channel {
+                Channel::ThetaMotor => plant.theta_motor_rad(),
+                Channel::ThetaIn => plant.theta_in_rad(),
+                Channel::ThetaOut => plant.theta_out_rad(),
+                Channel::F1 => f1,
+                Channel::F2 => f2,
+                Channel::F3 => f3,
+                Channel::F4 => f4,
+                Channel::TorqueIn => plant.torque_in_nm(config),
+                Channel::TorqueOut => plant.torque_out_nm(config),
+                Channel::MotorCurrent => plant.current_a(),
+                Channel::ThetaRef | Channel::Duty | Channel::BusVoltage | Channel::DriveEnable => 0.0,
+            };
+            let mut port = SensorPort { t_s, dt_s, value };
+            self.effects.measure(*channel, states, &mut port);
+            values.push(port.value);
+        }
+    }
+}
+
+fn corrected(effects: &EffectSet, channel: Channel, t_s: &[f64], shown: &[f64]) -> Vec<f64> {
+    let mut states = FRESH_STATES;
+    let mut before_s = t_s.first().copied().unwrap_or(0.0);
+    t_s.iter()
+        .zip(shown)
+        .map(|(&t_s, &value)| {
+            let mut port = SensorPort { t_s, dt_s: t_s - before_s, value };
+            before_s = t_s;
+            effects.correct(channel, &mut states, &mut port);
+            port.value
+        })
+        .collect()
+}

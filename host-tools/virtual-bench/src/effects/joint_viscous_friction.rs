@@ -1,0 +1,25 @@
+//! More viscous friction at the joint than the rig file says.
+
+use serde_json::Value;
+
+use super::{Component, Describe};
+use crate::draw::Draw;
+
+/// Extra viscous friction of the joint: `torque = coefficient · omega`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointViscousFriction {
+    /// Added to the nominal coefficient \[Nm s/rad\].
+    pub coefficient_nm_s_per_rad: f64,
+}
+
+impl Describe for JointViscousFriction {
+    const COMPONENT: Component = Component::Joint;
+
+    fn drawn(strength: f64, draw: &mut Draw) -> Self {
+        Self { coefficient_nm_s_per_rad: 0.09 * strength * draw.uniform(0.85, 1.2) }
+    }
+
+    fn parameters(&self) -> Vec<(&'static str, Value)> {
+        vec![("coefficient_nm_s_per_rad", self.coefficient_nm_s_per_rad.into())]
+    }
+}

@@ -1,0 +1,354 @@
+//! Motor, gear, drum, two tendons, output pulley and arm, advanced together with semi-implicit Euler.
+//!
+//! ```text
+//! rotor --gear spring--> shaft (encoder) --hub--> drum ==tendon a, b== output pulley --hub--> arm (encoder)
+//! ```
+//! All rotations are counted at the input pulley (rotor angle over N). Velocities follow from forces at the old
+//! positions, positions from the new velocities.
+
+use crate::bristle::ShaftBristle;
+use crate::config::BenchConfig;
+use crate::effects::{ActiveEffects, AsymmetricFriction};
+use crate::sheath;
+use crate::tendon::{Contact, Material, Tendon};
+
+/// Angle and speed of one rotating body.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Shaft {
+    pub angle_rad: f64,
+    pub omega_rad_per_s: f64,
+}
+
+impl Shaft {
+    #[inline]
+    fn advance(&mut self, torque_nm: f64, inertia_kg_m2: f64, dt: f64) {
+        self.omega_rad_per_s += dt * torque_nm / inertia_kg_m2;
+        self.angle_rad += dt * self.omega_rad_per_s;
+    }
+}
+
+/// Torsion spring between two bodies, with play.
+#[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "the shared end of the names is the unit")]
+struct Coupling {
+    stiffness_nm_per_rad: f64,
+    damping_nm_s_per_rad: f64,
+    gap_rad: f64,
+}
+
+impl Coupling {
+    /// A coupling whose lighter side, of `inertia_kg_m2`, is damped to a tenth of critical.
+    fn new(stiffness_nm_per_rad: f64, inertia_kg_m2: f64, gap_rad: f64) -> Self {
+        let damping_nm_s_per_rad = 0.2 * (stiffness_nm_per_rad * inertia_kg_m2).sqrt();
+        Self { stiffness_nm_per_rad, damping_nm_s_per_rad, gap_rad: gap_rad.max(0.0) }
+    }
+
+    /// Torque from `drive` to `driven` \[Nm\]; a flank pushes and never pulls.
+    #[inline]
+    fn torque_nm(&self, drive: Shaft, driven: Shaft) -> f64 {
+        let twist = drive.angle_rad - driven.angle_rad;
+        let rate = drive.omega_rad_per_s - driven.omega_rad_per_s;
+        if self.gap_rad == 0.0 {
+            return self.stiffness_nm_per_rad * twist + self.damping_nm_s_per_rad * rate;
+        }
+        let depth = twist - twist.clamp(-0.5 * self.gap_rad, 0.5 * self.gap_rad);
+        let torque = self.stiffness_nm_per_rad * depth + self.damping_nm_s_per_rad * rate;
+        if depth > 0.0 {
+            torque.max(0.0)
+        } else if depth < 0.0 {
+            torque.min(0.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// State that only effects need.
+#[derive(Debug, Clone, Default)]
+struct EffectState {
+    motor_coulomb: ShaftBristle,
+    motor_stribeck: ShaftBristle,
+    gear_load: ShaftBristle,
+    gear_carried_nm: f64,
+    joint_coulomb: ShaftBristle,
+    winding_rise_k: f64,
+    creep_strain: [f64; 2],
+}
+
+/// The bench in motion.
+#[derive(Debug, Clone)]
+pub(crate) struct Plant {
+    config: BenchConfig,
+    effects: ActiveEffects,
+    state: EffectState,
+    gear: Coupling,
+    drum_hub: Coupling,
+    arm_hub: Coupling,
+    /// Cable a and cable b.
+    tendons: [Tendon; 2],
+    /// Normal force of the nodes without tension \[N\]; empty without that effect.
+    preload_n: Vec<f64>,
+    nominal_bend_rad: Vec<f64>,
+    first_bend_share: Vec<f64>,
+    last_bend_share: Vec<f64>,
+    current_a: f64,
+    rotor: Shaft,
+    input: Shaft,
+    drum: Shaft,
+    output: Shaft,
+    arm: Shaft,
+    clock_s: f64,
+    steps: u64,
+    clock_start_s: f64,
+}
+
+impl Plant {
+    /// A bench at rest at theta = 0, at time `clock_start_s` of the effects' clock.
+    pub(crate) fn new(config: &BenchConfig, effects: ActiveEffects, clock_start_s: f64) -> Self {
+        let tendon = Tendon::new(config);
+        let nominal_bend_rad = tendon.bend_rad.clone();
+        let single = |bend| sheath::single_bend(config.nodes, bend);
+        let first_bend_share = config.bends.first().map_or_else(Vec::new, single);
+        let last_bend_share = config.bends.last().map_or_else(Vec::new, single);
+        let preload_n = effects
+            .bending_friction
+            .as_ref()
+            .map_or_else(Vec::new, |law| law.preload_n(&nominal_bend_rad, config.friction_coefficient));
+        let elastic = config.pretension_n / config.axial_stiffness_n;
+        let strain =
+            effects.tendon_creep.as_ref().map_or(0.0, |law| law.strain_after(clock_start_s, elastic));
+        let state = EffectState { creep_strain: [strain; 2], ..EffectState::default() };
+        let gap = |gap: Option<f64>| gap.unwrap_or(0.0);
+        let mut plant = Self {
+            gear: Coupling::new(
+                config.gear_stiffness_nm_per_rad,
+                config.input_shaft_inertia_kg_m2,
+                gap(effects.gear_backlash.as_ref().map(|e| e.gap_rad)),
+            ),
+            drum_hub: Coupling::new(
+                config.hub_stiffness_nm_per_rad,
+                config.input_shaft_inertia_kg_m2,
+                gap(effects.transmission_backlash.as_ref().map(|e| e.gap_rad)),
+            ),
+            arm_hub: Coupling::new(
+                config.hub_stiffness_nm_per_rad,
+                config.output_pulley_inertia_kg_m2,
+                gap(effects.joint_backlash.as_ref().map(|e| e.gap_rad)),
+            ),
+            config: config.clone(),
+            effects,
+            state,
+            tendons: [tendon.clone(), tendon],
+            preload_n,
+            nominal_bend_rad,
+            first_bend_share,
+            last_bend_share,
+            current_a: 0.0,
+            rotor: Shaft::default(),
+            input: Shaft::default(),
+            drum: Shaft::default(),
+            output: Shaft::default(),
+            arm: Shaft::default(),
+            clock_s: clock_start_s,
+            steps: 0,
+            clock_start_s,
+        };
+        plant.update_tensions();
+        plant
+    }
+
+    /// Motor current \[A\].
+    pub(crate) fn current_a(&self) -> f64 {
+        self.current_a
+    }
+
+    /// Rotor, counted at the input pulley.
+    pub(crate) fn rotor(&self) -> Shaft {
+        self.rotor
+    }
+
+    /// Shaft with the input encoder.
+    pub(crate) fn input(&self) -> Shaft {
+        self.input
+    }
+
+    /// Arm, with the joint encoder.
+    pub(crate) fn arm(&self) -> Shaft {
+        self.arm
+    }
+
+    /// Tensions f1, f2, f3, f4 \[N\].
+    pub(crate) fn tensions_n(&self) -> [f64; 4] {
+        let [a, b] = &self.tendons;
+        [a.input_n(), a.output_n(), b.input_n(), b.output_n()]
+    }
+
+    /// One step under a constant duty.
+    pub(crate) fn step(&mut self, duty: f64) {
+        let dt = self.config.step_s;
+        self.update_bends();
+        self.update_tensions();
+        let input_nm = (self.tendons[0].input_n() - self.tendons[1].input_n()) * self.config.input_radius_m;
+        let output_nm =
+            (self.tendons[0].output_n() - self.tendons[1].output_n()) * self.config.output_radius_m;
+        self.advance_motor(duty, dt);
+        let drum_nm = self.drum_hub.torque_nm(self.input, self.drum);
+        let gear_nm = self.advance_rotor_and_shaft(drum_nm, dt);
+        if let Some(law) = &self.effects.gear_load_friction {
+            // Applied on the rotor after its step: the friction of a tooth reacts on the motor side.
+            let state = &mut self.state;
+            let friction = law.torque_nm(
+                &mut state.gear_load,
+                &mut state.gear_carried_nm,
+                gear_nm,
+                self.rotor.omega_rad_per_s,
+                dt,
+            );
+            self.rotor.omega_rad_per_s -= dt * friction / self.rotor_inertia_kg_m2();
+        }
+        let arm_nm = self.arm_hub.torque_nm(self.output, self.arm);
+        self.drum.advance(drum_nm - input_nm, self.config.input_drum_inertia_kg_m2, dt);
+        self.output.advance(output_nm - arm_nm, self.config.output_pulley_inertia_kg_m2, dt);
+        self.advance_arm(arm_nm, dt);
+        self.advance_tendons(dt);
+        self.steps += 1;
+        self.clock_s = self.clock_start_s + self.steps as f64 * dt;
+    }
+
+    fn rotor_inertia_kg_m2(&self) -> f64 {
+        self.config.rotor_inertia_kg_m2 * self.config.gear_ratio * self.config.gear_ratio
+    }
+
+    fn torque_constant_at_pulley(&self) -> f64 {
+        let swing = self.effects.torque_constant_swing.as_ref().map_or(1.0, |law| law.factor(self.clock_s));
+        swing * self.config.torque_constant_nm_per_a * self.config.gear_ratio
+    }
+
+    /// `L di/dt = V − R i − kt N omega`.
+    fn advance_motor(&mut self, duty: f64, dt: f64) {
+        let duty = self.effects.drive_dead_zone.as_ref().map_or(duty, |law| law.effective_duty(duty));
+        let mut resistance = self.config.resistance_ohm;
+        if let Some(law) = &self.effects.winding_heating {
+            let cold_loss_w = self.current_a * self.current_a * resistance;
+            resistance *= law.resistance_factor(&mut self.state.winding_rise_k, cold_loss_w, dt);
+        }
+        let back_emf = self.torque_constant_at_pulley() * self.rotor.omega_rad_per_s;
+        let voltage = duty * self.config.supply_v - resistance * self.current_a - back_emf;
+        self.current_a += dt / self.config.inductance_h * voltage;
+    }
+
+    /// Rotor and input shaft; returns the torque that the gear carries.
+    fn advance_rotor_and_shaft(&mut self, drum_nm: f64, dt: f64) -> f64 {
+        let gear_nm = self.gear.torque_nm(self.rotor, self.input);
+        let mut rotor_nm = self.torque_constant_at_pulley() * self.current_a - gear_nm;
+        if let Some(law) = &self.effects.motor_coulomb_friction {
+            rotor_nm -= law.torque_nm(&mut self.state.motor_coulomb, self.rotor.omega_rad_per_s, dt);
+        }
+        if let Some(law) = &self.effects.motor_stribeck_friction {
+            rotor_nm -= law.torque_nm(&mut self.state.motor_stribeck, self.rotor.omega_rad_per_s, dt);
+        }
+        if let Some(law) = &self.effects.motor_cogging {
+            rotor_nm += law.torque_nm(self.rotor.angle_rad);
+        }
+        let extra =
+            self.effects.motor_viscous_friction.as_ref().map_or(0.0, |law| law.coefficient_nm_s_per_rad);
+        let viscous_nm = (self.config.motor_viscous_nm_s_per_rad + extra) * self.input.omega_rad_per_s;
+        let inertia = self.rotor_inertia_kg_m2();
+        self.rotor.advance(rotor_nm, inertia, dt);
+        self.input.advance(gear_nm - drum_nm - viscous_nm, self.config.input_shaft_inertia_kg_m2, dt);
+        gear_nm
+    }
+
+    fn advance_arm(&mut self, hub_nm: f64, dt: f64) {
+        let effects = &self.effects;
+        let arm = self.arm;
+        let extra_kg = effects.payload_change.as_ref().map_or(0.0, |law| law.extra_kg(self.clock_s));
+        let lever_m = self.config.arm_m;
+        let inertia = self.config.arm_inertia_kg_m2() + extra_kg * lever_m * lever_m;
+        let weight_n = (self.config.mass_kg + extra_kg) * self.config.gravity_m_per_s2;
+        let extra_viscous =
+            effects.joint_viscous_friction.as_ref().map_or(0.0, |law| law.coefficient_nm_s_per_rad);
+        let viscous = self.config.joint_viscous_nm_s_per_rad + extra_viscous;
+        let mut torque = hub_nm - weight_n * lever_m * arm.angle_rad.sin() - viscous * arm.omega_rad_per_s;
+        if let Some(law) = &effects.joint_coulomb_friction {
+            torque -= law.torque_nm(&mut self.state.joint_coulomb, arm.omega_rad_per_s, dt);
+        }
+        if let Some(law) = &effects.joint_spring {
+            torque += law.torque_nm(arm.angle_rad);
+        }
+        if let Some(law) = &effects.end_stop_contact {
+            torque += law.torque_nm(arm.angle_rad, arm.omega_rad_per_s);
+        }
+        if let Some(law) = &effects.joint_magnetic_detent {
+            torque += law.torque_nm(arm.angle_rad);
+        }
+        self.arm.advance(torque, inertia, dt);
+    }
+
+    /// Bend angles of this step, where an effect changes them.
+    fn update_bends(&mut self) {
+        let pose = &self.effects.wrap_angle_varies_with_pose;
+        let disturbed = &self.effects.wrap_angle_disturbed;
+        if pose.is_none() && disturbed.is_none() {
+            return;
+        }
+        let last_rad = pose.as_ref().map_or(0.0, |law| law.change_rad(self.arm.angle_rad));
+        let first_rad = disturbed.as_ref().map_or(0.0, |law| law.change_rad(self.clock_s));
+        for tendon in &mut self.tendons {
+            let shares = self.first_bend_share.iter().zip(&self.last_bend_share);
+            for ((bend, nominal), (first, last)) in
+                tendon.bend_rad.iter_mut().zip(&self.nominal_bend_rad).zip(shares)
+            {
+                *bend = (nominal + first_rad * first + last_rad * last).max(0.0);
+            }
+        }
+    }
+
+    fn update_tensions(&mut self) {
+        let loss = self.effects.pretension_loss.as_ref().map_or(1.0, |law| law.factor(self.clock_s));
+        for (index, tendon) in self.tendons.iter_mut().enumerate() {
+            let sign = if index == 0 { -1.0 } else { 1.0 };
+            let end = |shaft: Shaft, radius_m: f64| {
+                (sign * radius_m * shaft.angle_rad, sign * radius_m * shaft.omega_rad_per_s)
+            };
+            tendon.set_ends(
+                end(self.drum, self.config.input_radius_m),
+                end(self.output, self.config.output_radius_m),
+            );
+            let material = Material {
+                pretension_n: loss * self.config.pretension_n,
+                creep_m: self.state.creep_strain[index] * tendon.element_m(),
+                stiffening: self.effects.tendon_stiffening.as_ref(),
+                slack: self.effects.tendon_slack.as_ref(),
+            };
+            tendon.update_tensions(&material);
+        }
+    }
+
+    fn advance_tendons(&mut self, dt: f64) {
+        let effects = &self.effects;
+        let drift = effects.friction_drift.as_ref().map_or(1.0, |law| law.factor(self.clock_s));
+        let sides = effects.asymmetric_friction.as_ref().map_or([1.0; 2], AsymmetricFriction::factors);
+        let soft = effects.presliding_compliance.as_ref().map_or(1.0, |law| law.stiffness_ratio);
+        for (index, tendon) in self.tendons.iter_mut().enumerate() {
+            let contact = Contact {
+                friction_coefficient: self.config.friction_coefficient * drift * sides[index],
+                bristle_stiffness_per_m: self.config.bristle_stiffness_per_m * soft,
+                stribeck: effects.sheath_stribeck_friction.as_ref(),
+                viscous: effects.sheath_viscous_friction.as_ref(),
+                preload_n: &self.preload_n,
+                spot: if index == 0 { effects.sheath_kink_spot.as_ref() } else { None },
+            };
+            if let Some(law) = &effects.tendon_creep {
+                let mean_n = 0.5 * (tendon.input_n() + tendon.output_n());
+                let strain = &mut self.state.creep_strain[index];
+                *strain = law.advance(*strain, mean_n / self.config.axial_stiffness_n, dt);
+            }
+            tendon.advance(&contact, dt);
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "plant_tests.rs"]
+mod tests;

@@ -1,0 +1,387 @@
+//! What an effect is: a named part of the physics that a joint may have beyond the nominal model.
+//!
+//! An effect is one file below [`crate::effects`]. It declares itself with a [`Descriptor`] and changes the simulation
+//! through the hooks of [`Effect`]: each hook receives a *port*, the quantities at one place of the joint, and alters
+//! what it needs to. A hook that an effect leaves out does nothing; an effect that is not active costs nothing.
+
+use crate::channel::Channel;
+
+/// Largest number of parameters that one effect may have.
+pub const MAX_PARAMETERS: usize = 6;
+
+/// Largest number of state variables that one effect may keep.
+pub const MAX_STATE: usize = 6;
+
+/// State variables of one active effect; all zero when a run starts.
+pub type EffectState = [f64; MAX_STATE];
+
+/// Part of the joint that an effect belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Component {
+    /// Drive electronics, motor and gear up to the input pulley.
+    Motor,
+    /// Tendons and sheaths between the two pulleys.
+    Transmission,
+    /// Output pulley, arm and load.
+    Joint,
+    /// What measures.
+    Sensors,
+}
+
+impl Component {
+    /// All components, input to output.
+    pub const ALL: [Self; 4] = [Self::Motor, Self::Transmission, Self::Joint, Self::Sensors];
+
+    /// Name as files write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Motor => "motor",
+            Self::Transmission => "transmission",
+            Self::Joint => "joint",
+            Self::Sensors => "sensors",
+        }
+    }
+}
+
+/// How an optimiser should measure steps in a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Steps are differences.
+    Linear,
+    /// Steps are ratios; the parameter is positive and may span decades.
+    Log,
+}
+
+/// Name, unit, range and default of one parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterSpec {
+    /// Name in files; carries the unit as suffix where it has one.
+    pub name: &'static str,
+    /// SI unit as reports print it; `1` for a ratio.
+    pub unit: &'static str,
+    /// Smallest value that is accepted.
+    pub lower: f64,
+    /// Largest value that is accepted.
+    pub upper: f64,
+    /// Value when a file does not say: a strength that a bench typically shows.
+    pub default: f64,
+    /// Measure of steps for an optimiser.
+    pub scale: Scale,
+    /// What the parameter means, one line.
+    pub meaning: &'static str,
+}
+
+impl ParameterSpec {
+    /// Parameter whose steps are differences.
+    #[must_use]
+    pub const fn linear(
+        name: &'static str,
+        unit: &'static str,
+        [lower, upper]: [f64; 2],
+        default: f64,
+        meaning: &'static str,
+    ) -> Self {
+        Self { name, unit, lower, upper, default, scale: Scale::Linear, meaning }
+    }
+
+    /// Positive parameter whose steps are ratios.
+    #[must_use]
+    pub const fn log(
+        name: &'static str,
+        unit: &'static str,
+        [lower, upper]: [f64; 2],
+        default: f64,
+        meaning: &'static str,
+    ) -> Self {
+        Self { name, unit, lower, upper, default, scale: Scale::Log, meaning }
+    }
+}
+
+/// What an effect declares about itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Descriptor {
+    /// Identifier in files and reports.
+    pub id: &'static str,
+    /// Part of the joint to which it belongs.
+    pub component: Component,
+    /// One line on the physics.
+    pub summary: &'static str,
+    /// Parameters, at most [`MAX_PARAMETERS`]; the first is the strength.
+    pub parameters: &'static [ParameterSpec],
+    /// Strength at which the effect vanishes; `None` for an effect that is either there or not.
+    pub neutral: Option<f64>,
+    /// Channels that the effect may distort; empty for anything but a sensor's effect.
+    pub channels: &'static [Channel],
+}
+
+impl Descriptor {
+    /// Default value of every parameter; unused places are zero.
+    #[must_use]
+    pub fn defaults(&self) -> [f64; MAX_PARAMETERS] {
+        let mut values = [0.0; MAX_PARAMETERS];
+        for (value, spec) in values.iter_mut().zip(self.parameters) {
+            *value = spec.default;
+        }
+        values
+    }
+
+    /// Place of a parameter by its name.
+    #[must_use]
+    pub fn index_of(&self, name: &str) -> Option<usize> {
+        self.parameters.iter().position(|spec| spec.name == name)
+    }
+}
+
+/// Electrical side of the motor, before the current of this step is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrivePort {
+    /// Time, s.
+    pub t_s: f64,
+    /// Step, s.
+    pub dt_s: f64,
+    /// Current of the last step, A.
+    pub current_a: f64,
+    /// Bridge duty that acts on the winding; an effect may change it.
+    pub duty: f64,
+    /// Winding resistance, Ω; an effect may change it.
+    pub resistance_ohm: f64,
+}
+
+/// Mechanical side of the motor, seen at the input pulley.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorPort {
+    /// Time, s.
+    pub t_s: f64,
+    /// Step, s.
+    pub dt_s: f64,
+    /// Rotor angle in input-pulley radians.
+    pub theta_rad: f64,
+    /// Its speed, rad/s.
+    pub omega_rad_s: f64,
+    /// Torque of the current, `k_t N i`, N·m at the input pulley.
+    pub motor_torque_nm: f64,
+    /// Torque of the load on the input pulley, N·m; positive accelerates it.
+    pub load_torque_nm: f64,
+    /// Torque that an effect adds, N·m at the input pulley; positive accelerates it.
+    pub torque_nm: f64,
+    /// Level of dry friction, N·m ≥ 0; it opposes motion and never reverses it.
+    pub coulomb_nm: f64,
+    /// Play between rotor and input pulley, rad at the pulley.
+    pub gear_play_rad: f64,
+}
+
+/// Friction between tendon and sheath as it acts in one tendon for slip that starts at one end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlipLaw {
+    /// Friction coefficient μ.
+    pub friction_coefficient: f64,
+    /// Friction that does not scale with tension, N per radian of wrap.
+    pub friction_n_per_rad: f64,
+}
+
+/// One tendon in its sheath; index 0 of an array is the input end, index 1 the output end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TendonPort {
+    /// Wrap angle K, rad.
+    pub wrap_angle_rad: f64,
+    /// Speed of each tendon end along the sheath, m/s; positive moves towards the input.
+    pub speed_m_s: [f64; 2],
+    /// Slip law for slip that starts at each end.
+    pub slip: [SlipLaw; 2],
+    /// Mean tension, N.
+    pub mean_tension_n: f64,
+    /// Length added to the unloaded tendon, m; lowers the tension.
+    pub added_length_m: f64,
+    /// Whether the tendon goes slack instead of pushing.
+    pub unilateral: bool,
+}
+
+/// Both tendons between the pulleys.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TransmissionPort {
+    /// Time, s.
+    pub t_s: f64,
+    /// Step, s.
+    pub dt_s: f64,
+    /// Input pulley angle, rad.
+    pub theta_in_rad: f64,
+    /// Output pulley angle, rad.
+    pub theta_out_rad: f64,
+    /// Torque of the input pulley, N·m, last step.
+    pub torque_in_nm: f64,
+    /// Stiffness of a tendon from end to end, EA/L, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Pretension F0, N.
+    pub pretension_n: f64,
+    /// Cables a and b.
+    pub tendons: [TendonPort; 2],
+    /// Play between the input pulley and the tendons, rad at the pulley.
+    pub play_rad: f64,
+}
+
+/// Arm and load, seen at the joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointPort {
+    /// Time, s.
+    pub t_s: f64,
+    /// Step, s.
+    pub dt_s: f64,
+    /// Joint angle, rad.
+    pub theta_rad: f64,
+    /// Joint speed, rad/s.
+    pub omega_rad_s: f64,
+    /// Weight at the arm's end, kg; an effect may change it.
+    pub mass_kg: f64,
+    /// Torque that an effect adds, N·m; positive accelerates the joint.
+    pub torque_nm: f64,
+    /// Level of dry friction, N·m ≥ 0; it opposes motion and never reverses it.
+    pub coulomb_nm: f64,
+    /// Play between output pulley and arm, rad.
+    pub play_rad: f64,
+}
+
+/// One sensor at a sampling instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorPort {
+    /// Time, s.
+    pub t_s: f64,
+    /// Time since the last sample, s; zero at the first.
+    pub dt_s: f64,
+    /// Value, SI unit of the channel; an effect replaces what the sensor would have shown.
+    pub value: f64,
+}
+
+/// One piece of physics beyond the nominal model.
+///
+/// `parameters` stand in the order of the descriptor. Hooks run once a simulation step, sensor hooks once a sample.
+pub trait Effect: Sync {
+    /// Name, component and parameters.
+    fn descriptor(&self) -> &'static Descriptor;
+
+    /// Changes what drives the winding.
+    fn drive(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut DrivePort) {
+        let _ = (parameters, state, port);
+    }
+
+    /// Changes torque and friction of motor and gear.
+    fn motor(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut MotorPort) {
+        let _ = (parameters, state, port);
+    }
+
+    /// Changes tendons and sheaths.
+    fn transmission(
+        &self,
+        parameters: &[f64; MAX_PARAMETERS],
+        state: &mut EffectState,
+        port: &mut TransmissionPort,
+    ) {
+        let _ = (parameters, state, port);
+    }
+
+    /// Changes arm and load.
+    fn joint(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut JointPort) {
+        let _ = (parameters, state, port);
+    }
+
+    /// True value in, shown value out.
+    fn measure(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut SensorPort) {
+        let _ = (parameters, state, port);
+    }
+
+    /// Shown value in, true value out, as far as the sensor allows; the inverse of [`Effect::measure`] that a
+    /// simulation applies to channels that drive it.
+    fn correct(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut SensorPort) {
+        let _ = (parameters, state, port);
+    }
+}
+
+/// Channels to which a sensor's effect applies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// The effect belongs to no sensor.
+    None,
+    /// One channel.
+    One(Channel),
+    /// All four tension channels, which share an amplifier type.
+    Tensions,
+}
+
+impl Target {
+    /// Whether `channel` is meant.
+    #[must_use]
+    pub fn includes(self, channel: Channel) -> bool {
+        match self {
+            Self::None => false,
+            Self::One(one) => one == channel,
+            Self::Tensions => Channel::TENSIONS.contains(&channel),
+        }
+    }
+
+    /// Name in files: a column role, or `tensions`; `None` where there is no channel.
+    #[must_use]
+    pub const fn name(self) -> Option<&'static str> {
+        match self {
+            Self::None => None,
+            Self::One(channel) => Some(channel.role()),
+            Self::Tensions => Some("tensions"),
+        }
+    }
+}
+
+/// An effect with its parameters: configuration only.
+#[derive(Clone, Copy)]
+pub struct ActiveEffect {
+    /// The physics.
+    pub effect: &'static dyn Effect,
+    /// Values in the order of the descriptor.
+    pub parameters: [f64; MAX_PARAMETERS],
+    /// Sensor channels it applies to.
+    pub target: Target,
+}
+
+impl ActiveEffect {
+    /// The effect with default parameters.
+    #[must_use]
+    pub fn with_defaults(effect: &'static dyn Effect) -> Self {
+        let descriptor = effect.descriptor();
+        let target = match descriptor.channels {
+            [] => Target::None,
+            [one, ..] => Target::One(*one),
+        };
+        Self { effect, parameters: descriptor.defaults(), target }
+    }
+
+    /// Declaration of the effect.
+    #[must_use]
+    pub fn descriptor(&self) -> &'static Descriptor {
+        self.effect.descriptor()
+    }
+
+    /// The same effect with one parameter set by name; unchanged when it has no such parameter.
+    #[must_use]
+    pub fn with(mut self, name: &str, value: f64) -> Self {
+        if let Some(index) = self.descriptor().index_of(name) {
+            self.parameters[index] = value;
+        }
+        self
+    }
+}
+
+impl core::fmt::Debug for ActiveEffect {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("ActiveEffect")
+            .field("id", &self.descriptor().id)
+            .field("parameters", &&self.parameters[..self.descriptor().parameters.len()])
+            .field("target", &self.target)
+            .finish()
+    }
+}
+
+impl PartialEq for ActiveEffect {
+    fn eq(&self, other: &Self) -> bool {
+        self.descriptor().id == other.descriptor().id
+            && self.parameters == other.parameters
+            && self.target == other.target
+    }
+}

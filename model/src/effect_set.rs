@@ -1,0 +1,124 @@
+//! The effects that one simulation contains, sorted by component.
+
+use crate::channel::Channel;
+use crate::effect::Effect;
+use crate::effect::{
+    ActiveEffect, Component, DrivePort, EffectState, JointPort, MAX_PARAMETERS, MAX_STATE, MotorPort,
+    SensorPort, TransmissionPort,
+};
+
+/// Largest number of effects in one simulation.
+pub const MAX_ACTIVE: usize = 12;
+
+/// More than [`MAX_ACTIVE`] effects were asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyEffects;
+
+impl core::fmt::Display for TooManyEffects {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "more than {MAX_ACTIVE} effects in one simulation; leave some out")
+    }
+}
+
+impl core::error::Error for TooManyEffects {}
+
+/// Effects of one simulation: configuration only.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EffectSet {
+    active: [Option<ActiveEffect>; MAX_ACTIVE],
+    count: usize,
+}
+
+/// State of every effect of an [`EffectSet`], in its order.
+pub type EffectStates = [EffectState; MAX_ACTIVE];
+
+/// States at the start of a run.
+pub const FRESH_STATES: EffectStates = [[0.0; MAX_STATE]; MAX_ACTIVE];
+
+impl EffectSet {
+    /// No effects.
+    pub const EMPTY: Self = Self { active: [None; MAX_ACTIVE], count: 0 };
+
+    /// Adds an effect.
+    ///
+    /// # Errors
+    /// [`TooManyEffects`] when the set is full.
+    pub fn push(&mut self, effect: ActiveEffect) -> Result<(), TooManyEffects> {
+        let slot = self.active.get_mut(self.count).ok_or(TooManyEffects)?;
+        *slot = Some(effect);
+        self.count += 1;
+        Ok(())
+    }
+
+    /// The set of all given effects.
+    ///
+    /// # Errors
+    /// [`TooManyEffects`] when there are too many.
+    pub fn from_slice(effects: &[ActiveEffect]) -> Result<Self, TooManyEffects> {
+        let mut set = Self::EMPTY;
+        for effect in effects {
+            set.push(*effect)?;
+        }
+        Ok(set)
+    }
+
+    /// The effects in the order in which they were added.
+    pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect> {
+        self.active[..self.count].iter().flatten()
+    }
+
+    /// Whether any effect belongs to `component`.
+    #[must_use]
+    pub fn touches(&self, component: Component) -> bool {
+        self.iter().any(|effect| effect.descriptor().component == component)
+    }
+
+    fn for_each(
+        &self,
+        component: Component,
+        states: &mut EffectStates,
+        mut hook: impl FnMut(&'static dyn Effect, &ActiveEffect, &[f64; MAX_PARAMETERS], &mut EffectState),
+    ) {
+        for (active, state) in self.active[..self.count].iter().flatten().zip(states) {
+            if active.descriptor().component == component {
+                hook(active.effect, active, &active.parameters, state);
+            }
+        }
+    }
+
+    pub(crate) fn drive(&self, states: &mut EffectStates, port: &mut DrivePort) {
+        self.for_each(Component::Motor, states, |effect, _, p, s| effect.drive(p, s, port));
+    }
+
+    pub(crate) fn motor(&self, states: &mut EffectStates, port: &mut MotorPort) {
+        self.for_each(Component::Motor, states, |effect, _, p, s| effect.motor(p, s, port));
+    }
+
+    pub(crate) fn transmission(&self, states: &mut EffectStates, port: &mut TransmissionPort) {
+        self.for_each(Component::Transmission, states, |effect, _, p, s| effect.transmission(p, s, port));
+    }
+
+    pub(crate) fn joint(&self, states: &mut EffectStates, port: &mut JointPort) {
+        self.for_each(Component::Joint, states, |effect, _, p, s| effect.joint(p, s, port));
+    }
+
+    /// What the sensors of `channel` show for a true value, before quantisation and noise.
+    ///
+    /// `states` are the sensors' own: one array a channel, because a filter keeps its memory per channel.
+    pub fn measure(&self, channel: Channel, states: &mut EffectStates, port: &mut SensorPort) {
+        self.for_each(Component::Sensors, states, |effect, active, p, s| {
+            if active.target.includes(channel) {
+                effect.measure(p, s, port);
+            }
+        });
+    }
+
+    /// True value behind what the sensors of `channel` showed, as far as they allow.
+    pub fn correct(&self, channel: Channel, states: &mut EffectStates, port: &mut SensorPort) {
+        self.for_each(Component::Sensors, states, |effect, active, p, s| {
+            if active.target.includes(channel) {
+                effect.correct(p, s, port);
+            }
+        });
+    }
+}

@@ -1,0 +1,31 @@
+//! Play between rotor and input pulley: no torque passes inside the gap.
+
+use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+
+/// Play between rotor and input pulley: no torque passes inside the gap.
+pub struct GearBacklash;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "gear_backlash",
+    component: Component::Motor,
+    summary: "play in the gear between rotor and input pulley",
+    parameters: &[ParameterSpec::linear(
+        "gap_rad",
+        "rad",
+        [0.0, 0.5],
+        0.02,
+        "whole play, at the input pulley",
+    )],
+    neutral: Some(0.0),
+    channels: &[],
+};
+
+impl Effect for GearBacklash {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
+        port.gear_play_rad += p[0];
+    }
+}

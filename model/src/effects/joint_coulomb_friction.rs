@@ -1,0 +1,25 @@
+//! Dry friction of the joint: a constant torque that opposes motion.
+
+use crate::effect::{Component, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, ParameterSpec};
+
+/// Dry friction of the joint: a constant torque that opposes motion.
+pub struct JointCoulombFriction;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "joint_coulomb_friction",
+    component: Component::Joint,
+    summary: "dry friction in the joint",
+    parameters: &[ParameterSpec::linear("torque_nm", "N·m", [0.0, 20.0], 0.05, "friction torque")],
+    neutral: Some(0.0),
+    channels: &[],
+};
+
+impl Effect for JointCoulombFriction {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {
+        port.coulomb_nm += p[0];
+    }
+}

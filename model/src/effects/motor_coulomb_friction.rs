@@ -1,0 +1,31 @@
+//! Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
+
+use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+
+/// Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
+pub struct MotorCoulombFriction;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "motor_coulomb_friction",
+    component: Component::Motor,
+    summary: "dry friction in motor or gear",
+    parameters: &[ParameterSpec::linear(
+        "torque_nm",
+        "N·m",
+        [0.0, 20.0],
+        0.08,
+        "friction torque at the input pulley",
+    )],
+    neutral: Some(0.0),
+    channels: &[],
+};
+
+impl Effect for MotorCoulombFriction {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
+        port.coulomb_nm += p[0];
+    }
+}

@@ -1,0 +1,43 @@
+//! Dry friction of motor and gear that falls with speed: `τ = τ_c + τ_s e^{-(ω/ω_s)²}`.
+
+use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+use libm::exp;
+
+/// Dry friction of motor and gear that falls with speed: `τ = τ_c + τ_s e^{-(ω/ω_s)²}`.
+pub struct MotorStribeckFriction;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "motor_stribeck_friction",
+    component: Component::Motor,
+    summary: "dry friction in motor or gear that is higher at low speed",
+    parameters: &[
+        ParameterSpec::linear(
+            "excess_nm",
+            "N·m",
+            [0.0, 20.0],
+            0.08,
+            "friction at standstill above that at speed",
+        ),
+        ParameterSpec::log(
+            "speed_rad_s",
+            "rad/s",
+            [0.005, 20.0],
+            0.2,
+            "speed at which the excess has fallen to 37 %",
+        ),
+        ParameterSpec::linear("coulomb_nm", "N·m", [0.0, 20.0], 0.04, "friction at speed"),
+    ],
+    neutral: None,
+    channels: &[],
+};
+
+impl Effect for MotorStribeckFriction {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
+        let ratio = port.omega_rad_s / p[1];
+        port.coulomb_nm += p[2] + p[0] * exp(-ratio * ratio);
+    }
+}

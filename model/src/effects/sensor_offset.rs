@@ -1,0 +1,47 @@
+//! A sensor with a wrong zero: shown `x + o`.
+
+use crate::channel::Channel;
+use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+
+/// A sensor with a wrong zero: shown `x + o`.
+pub struct SensorOffset;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "sensor_offset",
+    component: Component::Sensors,
+    summary: "a sensor has a wrong zero",
+    parameters: &[ParameterSpec::linear(
+        "offset",
+        "unit of the channel",
+        [-1000.0, 1000.0],
+        1.0,
+        "shown minus true",
+    )],
+    neutral: Some(0.0),
+    channels: &[
+        Channel::F1,
+        Channel::F2,
+        Channel::F3,
+        Channel::F4,
+        Channel::ThetaIn,
+        Channel::ThetaOut,
+        Channel::ThetaMotor,
+        Channel::TorqueIn,
+        Channel::TorqueOut,
+        Channel::MotorCurrent,
+    ],
+};
+
+impl Effect for SensorOffset {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn measure(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {
+        port.value += p[0];
+    }
+
+    fn correct(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {
+        port.value -= p[0];
+    }
+}

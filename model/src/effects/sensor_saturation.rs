@@ -1,0 +1,43 @@
+//! A sensor that stops at a limit: shown `min(x, limit)`.
+
+use crate::channel::Channel;
+use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+
+/// A sensor that stops at a limit: shown `min(x, limit)`.
+pub struct SensorSaturation;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "sensor_saturation",
+    component: Component::Sensors,
+    summary: "a sensor saturates below its full scale",
+    parameters: &[ParameterSpec::linear(
+        "limit",
+        "unit of the channel",
+        [-1e4, 1e4],
+        50.0,
+        "largest value shown",
+    )],
+    neutral: None,
+    channels: &[
+        Channel::F1,
+        Channel::F2,
+        Channel::F3,
+        Channel::F4,
+        Channel::ThetaIn,
+        Channel::ThetaOut,
+        Channel::ThetaMotor,
+        Channel::TorqueIn,
+        Channel::TorqueOut,
+        Channel::MotorCurrent,
+    ],
+};
+
+impl Effect for SensorSaturation {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn measure(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {
+        port.value = port.value.min(p[0]);
+    }
+}

@@ -1,0 +1,38 @@
+//! Friction between tendon and sheath that grows with speed: `c |v|` in all, shared out along the wrap.
+
+use crate::effect::{
+    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
+};
+
+/// Friction between tendon and sheath that grows with speed: `c |v|` in all, shared out along the wrap.
+pub struct SheathViscousFriction;
+
+static DESCRIPTOR: Descriptor = Descriptor {
+    id: "sheath_viscous_friction",
+    component: Component::Transmission,
+    summary: "friction in the sheath that grows with speed",
+    parameters: &[ParameterSpec::linear(
+        "viscous_n_s_per_m",
+        "N·s/m",
+        [0.0, 5000.0],
+        60.0,
+        "friction force of one tendon per speed",
+    )],
+    neutral: Some(0.0),
+    channels: &[],
+};
+
+impl Effect for SheathViscousFriction {
+    fn descriptor(&self) -> &'static Descriptor {
+        &DESCRIPTOR
+    }
+
+    fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
+        for tendon in &mut port.tendons {
+            let wrap_angle_rad = tendon.wrap_angle_rad.max(1e-3);
+            for (law, speed) in tendon.slip.iter_mut().zip(tendon.speed_m_s) {
+                law.friction_n_per_rad += p[0] * speed.abs() / wrap_angle_rad;
+            }
+        }
+    }
+}

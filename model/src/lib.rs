@@ -1,0 +1,14 @@
+//! Physics of a joint pulled by two tendons in bent sheaths.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod channel;
+pub mod drive;
+pub mod effect;
+pub mod effect_set;
+pub mod effects;
+pub mod paper;
+pub mod parameters;
+pub mod plant;
+pub mod sheath;
+pub mod transmission;

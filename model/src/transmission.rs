@@ -1,0 +1,250 @@
+//! Two tendons between two pulleys: the antagonistic pair.
+//!
+//! Elongation of cable a is `r1 θ_in - r2 θ_out`, of cable b its negative (Eq. (6)–(7)); torques are
+//! `T_in = (F1 - F3) r1` and `T_out = (F2 - F4) r2` (Eq. (4)–(5)).
+
+use crate::effect::Component;
+use crate::effect::{SlipLaw, TendonPort, TransmissionPort};
+use crate::effect_set::{EffectSet, EffectStates};
+use crate::parameters::{FrictionLaw, PulleyParameters, SheathParameters, TendonParameters};
+use crate::sheath::{End, SheathError, SlipLimits, Tendon, TendonMesh};
+
+/// Contacts of each tendon unless a rig says otherwise.
+pub const DEFAULT_ELEMENTS: usize = 16;
+
+/// Pull of cables a and b for a pulley that turns towards +θ, at the input end; negated at the output end.
+const CABLE_SIGN: [f64; 2] = [1.0, -1.0];
+
+/// Part of a Newton step by which a play moves in one simulation step; below 1 so that two plays in a row settle.
+const PLAY_RELAXATION: f64 = 0.8;
+
+/// Pulleys, tendons and sheaths: configuration only.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TransmissionConfig {
+    pulleys: PulleyParameters,
+    tendon: TendonParameters,
+    sheath: SheathParameters,
+    mesh: TendonMesh,
+}
+
+impl TransmissionConfig {
+    /// A pair of equal tendons of constant curvature, with `elements` contacts each where friction is distributed.
+    ///
+    /// Without `sheath` the tendons run free. [`FrictionLaw::Lumped`] puts all friction on one contact in the middle.
+    ///
+    /// # Errors
+    /// [`SheathError`] when the mesh cannot be made.
+    pub fn new(
+        pulleys: PulleyParameters,
+        tendon: TendonParameters,
+        sheath: Option<SheathParameters>,
+        friction: FrictionLaw,
+        elements: usize,
+    ) -> Result<Self, SheathError> {
+        let stiffness_n_per_m = tendon.axial_stiffness_n / tendon.length_m;
+        let elements = match friction {
+            FrictionLaw::Distributed => elements,
+            FrictionLaw::Lumped => 1,
+        };
+        let mesh = TendonMesh::uniform(elements, stiffness_n_per_m)?;
+        let sheath = sheath.unwrap_or(SheathParameters { wrap_angle_rad: 0.0, friction_coefficient: 0.0 });
+        Ok(Self { pulleys, tendon, sheath, mesh })
+    }
+
+    /// The same pair with another mesh, for example of a sheath whose curvature varies along its length.
+    #[must_use]
+    pub fn with_mesh(mut self, mesh: TendonMesh) -> Self {
+        self.mesh = mesh;
+        self
+    }
+
+    /// Mesh of both tendons.
+    #[must_use]
+    pub const fn mesh(&self) -> &TendonMesh {
+        &self.mesh
+    }
+
+    /// Pulleys.
+    #[must_use]
+    pub const fn pulleys(&self) -> PulleyParameters {
+        self.pulleys
+    }
+
+    fn nominal_tendon_port(&self) -> TendonPort {
+        let slip =
+            SlipLaw { friction_coefficient: self.sheath.friction_coefficient, friction_n_per_rad: 0.0 };
+        TendonPort {
+            wrap_angle_rad: self.sheath.wrap_angle_rad,
+            speed_m_s: [0.0; 2],
+            slip: [slip; 2],
+            mean_tension_n: self.tendon.pretension_n,
+            added_length_m: 0.0,
+            unilateral: false,
+        }
+    }
+}
+
+/// State of the pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    tendons: [Tendon; 2],
+    limits: [[SlipLimits; 2]; 2],
+    added_length_m: [f64; 2],
+    unilateral: [bool; 2],
+    play_rad: f64,
+    play_offset_rad: f64,
+}
+
+impl Transmission {
+    /// Both tendons at the pretension, nothing slipping.
+    #[must_use]
+    pub fn at_rest(config: &TransmissionConfig) -> Self {
+        let wrap_friction = config.sheath.friction_coefficient * config.sheath.wrap_angle_rad;
+        let limits = SlipLimits::new(&config.mesh, wrap_friction, 0.0);
+        Self {
+            tendons: [Tendon::at_rest(&config.mesh, config.tendon.pretension_n); 2],
+            limits: [[limits; 2]; 2],
+            added_length_m: [0.0; 2],
+            unilateral: [false; 2],
+            play_rad: 0.0,
+            play_offset_rad: 0.0,
+        }
+    }
+
+    /// Cable a (0) or b (1).
+    #[must_use]
+    pub const fn tendon(&self, index: usize) -> &Tendon {
+        &self.tendons[index]
+    }
+
+    /// F1 to F4, N.
+    #[must_use]
+    pub fn end_tensions_n(&self, config: &TransmissionConfig) -> [f64; 4] {
+        let [a, b] = &self.tendons;
+        [
+            a.end_tension_n(&config.mesh, End::Input),
+            a.end_tension_n(&config.mesh, End::Output),
+            b.end_tension_n(&config.mesh, End::Input),
+            b.end_tension_n(&config.mesh, End::Output),
+        ]
+    }
+
+    /// Torque of the input pulley on the cables, `T_in = (F1 - F3) r1` (Eq. (4)), N·m.
+    #[must_use]
+    pub fn torque_in_nm(&self, config: &TransmissionConfig) -> f64 {
+        let [f1, _, f3, _] = self.end_tensions_n(config);
+        (f1 - f3) * config.pulleys.input_radius_m
+    }
+
+    /// Torque of the cables on the output pulley, `T_out = (F2 - F4) r2` (Eq. (5)), N·m.
+    #[must_use]
+    pub fn torque_out_nm(&self, config: &TransmissionConfig) -> f64 {
+        let [_, f2, _, f4] = self.end_tensions_n(config);
+        (f2 - f4) * config.pulleys.output_radius_m
+    }
+
+    /// Slope of the torque over a turn of one pulley, N·m/rad, from the last move of that pulley.
+    #[must_use]
+    pub fn stiffness_nm_per_rad(&self, config: &TransmissionConfig, end: End) -> f64 {
+        let radius_m = match end {
+            End::Input => config.pulleys.input_radius_m,
+            End::Output => config.pulleys.output_radius_m,
+        };
+        let [a, b] = &self.tendons;
+        (a.end_stiffness_n_per_m(end) + b.end_stiffness_n_per_m(end)) * radius_m * radius_m
+    }
+
+    /// Lets the effects set friction, stretch and play for the next moves.
+    pub(crate) fn apply_effects(
+        &mut self,
+        config: &TransmissionConfig,
+        effects: &EffectSet,
+        states: &mut EffectStates,
+        motion: PulleyMotion,
+    ) {
+        if !effects.touches(Component::Transmission) {
+            return;
+        }
+        let mut port = TransmissionPort {
+            t_s: motion.t_s,
+            dt_s: motion.dt_s,
+            theta_in_rad: motion.theta_in_rad,
+            theta_out_rad: motion.theta_out_rad,
+            torque_in_nm: self.torque_in_nm(config),
+            stiffness_n_per_m: 1.0 / config.mesh.total_compliance_m_per_n(),
+            pretension_n: config.tendon.pretension_n,
+            tendons: [config.nominal_tendon_port(); 2],
+            play_rad: 0.0,
+        };
+        for (index, (tendon, sign)) in port.tendons.iter_mut().zip(CABLE_SIGN).enumerate() {
+            tendon.speed_m_s = [
+                sign * motion.omega_in_rad_s * config.pulleys.input_radius_m,
+                sign * motion.omega_out_rad_s * config.pulleys.output_radius_m,
+            ];
+            let state = &self.tendons[index];
+            tendon.mean_tension_n = 0.5
+                * (state.end_tension_n(&config.mesh, End::Input)
+                    + state.end_tension_n(&config.mesh, End::Output));
+        }
+        effects.transmission(states, &mut port);
+        for (index, tendon) in port.tendons.iter().enumerate() {
+            let wrap_angle_rad = tendon.wrap_angle_rad.max(0.0);
+            for (limits, law) in self.limits[index].iter_mut().zip(&tendon.slip) {
+                limits.set(
+                    &config.mesh,
+                    law.friction_coefficient.max(0.0) * wrap_angle_rad,
+                    law.friction_n_per_rad.max(0.0) * wrap_angle_rad,
+                );
+            }
+            let longer_m = tendon.added_length_m - self.added_length_m[index];
+            if longer_m != 0.0 {
+                self.tendons[index].add_length(&config.mesh, longer_m);
+                self.added_length_m[index] = tendon.added_length_m;
+            }
+            self.unilateral[index] = tendon.unilateral;
+        }
+        self.play_rad = port.play_rad;
+    }
+
+    /// Turns the input pulley by `delta_rad`.
+    pub fn turn_input(&mut self, config: &TransmissionConfig, delta_rad: f64) {
+        self.turn(config, End::Input, delta_rad);
+        if self.play_rad > 0.0 || self.play_offset_rad != 0.0 {
+            // The pulley leads the tendons by the offset; inside the play it carries no torque, which a Newton step
+            // on the torque reaches.
+            let stiffness = self.stiffness_nm_per_rad(config, End::Input);
+            let wanted = self.play_offset_rad + PLAY_RELAXATION * self.torque_in_nm(config) / stiffness;
+            let half = 0.5 * self.play_rad;
+            let offset = wanted.clamp(-half, half);
+            self.turn(config, End::Input, self.play_offset_rad - offset);
+            self.play_offset_rad = offset;
+        }
+    }
+
+    /// Turns the output pulley by `delta_rad`.
+    pub fn turn_output(&mut self, config: &TransmissionConfig, delta_rad: f64) {
+        self.turn(config, End::Output, delta_rad);
+    }
+
+    fn turn(&mut self, config: &TransmissionConfig, end: End, delta_rad: f64) {
+        let pull_m = match end {
+            End::Input => config.pulleys.input_radius_m * delta_rad,
+            End::Output => -config.pulleys.output_radius_m * delta_rad,
+        };
+        for (index, sign) in CABLE_SIGN.into_iter().enumerate() {
+            let limits = &self.limits[index][end as usize];
+            self.tendons[index].move_end(&config.mesh, limits, end, sign * pull_m, self.unilateral[index]);
+        }
+    }
+}
+
+/// Angles and speeds of both pulleys at the start of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PulleyMotion {
+    pub t_s: f64,
+    pub dt_s: f64,
+    pub theta_in_rad: f64,
+    pub omega_in_rad_s: f64,
+    pub theta_out_rad: f64,
+    pub omega_out_rad_s: f64,
+}
