@@ -36,12 +36,16 @@ enum Command {
     Convert(ConvertArguments),
 }
 
-/// Runs a command line, says on stderr what there is to say, and returns the exit status.
-pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitStatus {
+/// From now on a panic, which is a defect of this program, says one line and ends the process with exit status 1.
+pub fn exit_on_panic() {
     std::panic::set_hook(Box::new(|panic| {
         say(&panic_line(panic));
         std::process::exit(ExitStatus::Failed as i32);
     }));
+}
+
+/// Runs a command line, says on stderr what there is to say, and returns the exit status.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitStatus {
     let result = match Cli::try_parse_from(arguments) {
         Ok(cli) => dispatch(&cli),
         Err(error) => usage(&error),
@@ -89,7 +93,7 @@ fn usage(error: &clap::Error) -> Result<Outcome, Failure> {
     Err(Failure::bad_input(format!("{what}; see `bowden --help`")))
 }
 
-/// A defect of this program, in one line.
+/// What panicked and where, in one line.
 fn panic_line(panic: &PanicHookInfo) -> String {
     let what = panic.payload_as_str().unwrap_or("no message");
     let place = panic.location().map_or_else(String::new, |place| format!(" at {place}"));

@@ -340,18 +340,14 @@ impl Origin {
 /// A reader that remembers how the data ended.
 struct Tail<R> {
     inner: R,
+    bytes: u64,
     last_byte: Option<u8>,
     cut_short: bool,
 }
 
 impl<R: Read> Tail<R> {
     fn new(inner: R) -> Self {
-        Self { inner, last_byte: None, cut_short: false }
-    }
-
-    /// Whether the data ended in the middle of a line.
-    fn ended_within_a_line(&self) -> bool {
-        self.last_byte != Some(b'\n')
+        Self { inner, bytes: 0, last_byte: None, cut_short: false }
     }
 }
 
@@ -359,6 +355,7 @@ impl<R: Read> Read for Tail<R> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         match self.inner.read(buffer) {
             Ok(read) => {
+                self.bytes += read as u64;
                 if let Some(last) = buffer[..read].last() {
                     self.last_byte = Some(*last);
                 }

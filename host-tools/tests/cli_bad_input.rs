@@ -140,7 +140,7 @@ fn a_recording_that_cannot_be_used_is_named_with_its_place() {
          record the file again",
         good_csv().len()
     );
-    let short: String = good_csv().lines().take(11).map(|line| format!("{line}\n")).collect();
+    let short: String = good_csv().split_inclusive('\n').take(11).collect();
     let quoted = with_line(20, "0.018,0.0018,30.02,\"open");
     let cases: Vec<(&str, Vec<u8>, &str)> = vec![
         ("rec.csv", vec![], "rec.csv:1: the file is empty, expected a header line with t_s; record again"),
@@ -210,7 +210,11 @@ fn a_recording_that_cannot_be_used_is_named_with_its_place() {
         ),
         ("rec.csv", not_utf8, &not_utf8_line),
         ("rec.csv", utf16, "rec.csv: byte 0: UTF-16 text; save the file as UTF-8"),
-        ("rec.csv", quoted, "rec.csv:20: a quote is opened and never closed; remove it"),
+        (
+            "rec.csv",
+            quoted,
+            "rec.csv:20: a quote is opened and not closed before the end of the line; remove it",
+        ),
         ("rec.csv.gz", damaged, &damaged_line),
         (
             "rec.mcap",
@@ -409,7 +413,7 @@ fn a_rig_that_cannot_be_used_is_named_with_line_and_column() {
         (
             "effects = []",
             "effects = [\"sensor_offset\"]\n[effects.sensor_offset]\noffset = 0.1\nchannel = \"f5_n\"",
-            "rig.toml:44:11: effect `sensor_offset` has no channel `f5_n`; did you mean `f1_n`?",
+            "rig.toml:44:11: effect `sensor_offset` has no channel `f5_n`; did you mean `f4_n`?",
         ),
         (
             "effects = []",
@@ -424,7 +428,7 @@ fn a_rig_that_cannot_be_used_is_named_with_line_and_column() {
         (
             "effects = []",
             "effects = []\n[recording.columns]\nf5_n = { column = \"x\" }",
-            "rig.toml:43:1: unknown role `f5_n` in [recording.columns]; did you mean `f1_n`?",
+            "rig.toml:43:1: unknown role `f5_n` in [recording.columns]; did you mean `f4_n`?",
         ),
         (
             "effects = []",
@@ -577,4 +581,26 @@ fn a_full_disk_is_a_failure_and_not_bad_input() {
         assert_eq!(stderr, format!("bowden: {name}: cannot be written: no space left on device\n"));
         assert_eq!(status, 1);
     }
+}
+
+/// Set in the process that is to panic.
+const PANICS: &str = "BOWDEN_TEST_PANICS";
+
+#[test]
+fn a_defect_is_one_line_and_exit_status_1() {
+    if std::env::var_os(PANICS).is_some() {
+        bowden::cli::exit_on_panic();
+        let worker = std::thread::spawn(|| panic!("no such\nstate"));
+        let _ = worker.join();
+        unreachable!("a panic in any thread ends the process");
+    }
+    let this_test = ["--exact", "a_defect_is_one_line_and_exit_status_1", "--nocapture"];
+    let output =
+        Command::new(std::env::current_exe().unwrap()).args(this_test).env(PANICS, "1").output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
+    assert!(
+        stderr.starts_with("bowden: internal error at ") && stderr.contains("no such\\nstate"),
+        "{stderr}"
+    );
 }

@@ -1,7 +1,9 @@
 //! A recording keeps every bit through CSV, gzipped CSV and MCAP, and what is not interpreted keeps every letter.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
 use bowden::recording::{Column, ColumnMap, ColumnSource, ReadOptions, Recording, TOPIC};
@@ -82,7 +84,7 @@ fn what_is_not_interpreted_keeps_every_letter_and_its_place() {
     let mut text = "mode,f1_n,t_s,\"odd \"\"name\"\"\",theta_in_rad\n".to_owned();
     for (sample, cell) in cells.iter().enumerate() {
         let quoted = format!("\"{}\"", cell.replace('"', "\"\""));
-        text += &format!("{quoted},{sample}.25,{sample}.5,{quoted},0.125\n");
+        writeln!(text, "{quoted},{sample}.25,{sample}.5,{quoted},0.125").unwrap();
     }
     let folder = tempfile::tempdir().unwrap();
     let first = folder.path().join("a.csv");
@@ -130,8 +132,6 @@ fn a_map_renames_and_scales_and_one_column_may_serve_two_roles() {
 fn what_is_not_asked_for_may_be_broken() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rec.csv");
-    fs::write(&path, b"t_s,duty,f1_n,junk\n0,0.5,NaN,\xff\n0.1,0.25,,\n").unwrap();
-    // Sniffing reads the start as text; behind it nothing but the asked columns counts.
     let text = "t_s,duty,f1_n,junk\n0,0.5,NaN,x\n0.1,0.25,,\n";
     fs::write(&path, text).unwrap();
     let options = ReadOptions { only: Some(vec![Channel::Duty]), ..ReadOptions::default() };
@@ -145,16 +145,19 @@ fn what_is_not_asked_for_may_be_broken() {
 fn places_are_lines_of_the_file_whatever_stands_between() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rec.csv");
-    fs::write(&path, "t_s,note\r\n0,a\r\n\r\n1,\"two\r\nlines\"\r\n2,c\r\n").unwrap();
+    fs::write(&path, "t_s,note\r\n0,a\r\n\r\n\r\n1,\"b, b\"\r\n\n2,c").unwrap();
     let recording = load(&path);
     let lines: Vec<String> =
         (0..3).map(|sample| recording.place(sample).rsplit(':').next().unwrap().to_owned()).collect();
-    assert_eq!(lines, ["2", "4", "6"]);
-    assert!(recording.slice(1..3).place(1).ends_with("rec.csv:6"));
+    assert_eq!(lines, ["2", "5", "7"]);
+    assert!(recording.slice(1..3).place(1).ends_with("rec.csv:7"));
 }
 
-/// Writes an MCAP file with the library alone: topic, encoding, messages.
-fn write_mcap(path: &Path, messages: &[(&str, &str, &str)]) {
+/// Topic, encoding, data.
+type Message<'m> = (&'m str, &'m str, &'m str);
+
+/// Writes an MCAP file with the library alone.
+fn write_mcap(path: &Path, messages: &[Message]) {
     let mut writer = mcap::Writer::new(std::io::BufWriter::new(fs::File::create(path).unwrap())).unwrap();
     for (number, (topic, encoding, data)) in messages.iter().enumerate() {
         let channel_id = writer.add_channel(0, topic, encoding, &BTreeMap::new()).unwrap();
@@ -189,7 +192,7 @@ fn other_topics_are_passed_over_and_told() {
 #[test]
 fn bad_messages_are_named_by_their_number() {
     let good = (TOPIC, "json", "{\"t_s\": 0.5, \"duty\": 0}");
-    let cases: &[(&[(&str, &str, &str)], &str)] = &[
+    let cases: &[(&[Message], &str)] = &[
         (&[("/imu", "json", "{}")], "no message on topic /bowden/samples; the file has /imu"),
         (&[(TOPIC, "ros1", "x")], "message 1: topic /bowden/samples is encoded as `ros1`, expected json"),
         (&[good, (TOPIC, "json", "[1]")], "message 2: not a JSON object"),
@@ -230,4 +233,47 @@ fn a_cut_mcap_file_gives_its_whole_samples_and_a_note() {
     assert_eq!(recording.t_s(), &t_s[..read]);
     let expected = format!("the file ends early; the {read} whole samples before the end were used");
     assert!(recording.notes()[0].ends_with(&expected), "{:?}", recording.notes());
+}
+
+/// The samples of `part` are the first of `whole`, to the last bit, and every column has as many.
+fn assert_is_start_of(part: &Recording, whole: &Recording, what: &str) {
+    let samples = part.len();
+    assert!(samples > 0 && samples < whole.len(), "{what}: {samples}");
+    assert_eq!(part, &whole.slice(0..samples), "{what}");
+}
+
+#[test]
+fn data_cut_at_any_byte_gives_whole_samples_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rec.csv.gz");
+    let t_s: Vec<f64> = (0..100).map(|sample| f64::from(sample) * 1e-3).collect();
+    let values: Vec<f64> = t_s.iter().map(|t_s| (7.0 * t_s).sin()).collect();
+    let plain = folder.path().join("rec.csv");
+    Recording::new("made", t_s.clone())
+        .with(Channel::F1, values)
+        .with(Channel::Duty, t_s)
+        .save(&plain)
+        .unwrap();
+    let whole = load(&plain);
+    let text = fs::read(&plain).unwrap();
+    // Stored without compression, a cut of the file is a cut of the table at the same distance from its start.
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::none());
+    encoder.write_all(&text).unwrap();
+    let stored = encoder.finish().unwrap();
+    for cut in (stored.len() - 150)..(stored.len() - 60) {
+        fs::write(&path, &stored[..cut]).unwrap();
+        let part = load(&path);
+        assert_is_start_of(&part, &whole, &format!("gzip cut at byte {cut}"));
+        let last_note = part.notes().last().unwrap();
+        assert!(last_note.contains(&format!("the {} whole samples", part.len())), "{last_note}");
+    }
+    // A table that ends within a line, but not within its last cell, loses that line.
+    let line_start = text[..text.len() - 1].iter().rposition(|byte| *byte == b'\n').unwrap() + 1;
+    let last_comma = text.iter().rposition(|byte| *byte == b',').unwrap();
+    for cut in line_start + 1..=last_comma + 1 {
+        fs::write(&plain, &text[..cut]).unwrap();
+        let part = load(&plain);
+        assert_is_start_of(&part, &whole, &format!("table cut at byte {cut}"));
+        assert!(part.notes()[0].ends_with(":101: the file ends within this line; the line was dropped"));
+    }
 }

@@ -29,6 +29,11 @@ const PLAY_RELAXATION: f64 = 0.8;
 /// half; without any loss the arm would bounce for seconds, which no bench does.
 const IMPACT_LOSS: f64 = 0.5;
 
+/// Internal friction of the ropes: the torque of a stretch rate, as a time. A wire rope loses some 5 % of its elastic
+/// energy per cycle near 20 Hz, which gives half a millisecond; without it the arm would ring for seconds after each
+/// start. At steady speed it does nothing.
+const ROPE_LOSS_S: f64 = 5e-4;
+
 /// What moves the input pulley.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InputBoundary {
@@ -355,8 +360,11 @@ impl Plant {
                 omega_out_rad_s: self.omega_out_rad_s,
             };
             transmission.apply_effects(parts, &config.effects, &mut self.states, motion);
+            // The arm is driven by the cables as they are before either pulley moves; a torque taken between the two
+            // moves would run ahead of the arm by a step and act as negative friction.
+            let cable_nm = self.torque_out_nm(config);
             self.step_input_side(config, input, dt_s);
-            self.step_output_side(config, input, dt_s);
+            self.step_output_side(config, input, cable_nm, dt_s);
         } else {
             self.step_direct(config, input, dt_s);
         }
@@ -378,7 +386,7 @@ impl Plant {
         }
         match (config.input, motor) {
             (InputBoundary::Motor, Some(motor)) => {
-                let load_nm = -self.torque_in_nm(config);
+                let load_nm = -self.torque_in_nm(config) - self.rope_loss_nm(config) * self.pulley_ratio(config);
                 let play_rad = self.turn_rotor(config, motor, load_nm, input.input_torque_nm, dt_s);
                 let delta_rad = dt_s * self.omega_motor_rad_s;
                 self.theta_motor_rad += delta_rad;
@@ -483,7 +491,7 @@ impl Plant {
         port
     }
 
-    fn step_output_side(&mut self, config: &PlantConfig, input: &StepInput, dt_s: f64) {
+    fn step_output_side(&mut self, config: &PlantConfig, input: &StepInput, cable_nm: f64, dt_s: f64) {
         if config.output == OutputBoundary::Angle {
             let delta_rad = input.theta_out_rad - self.theta_out_rad;
             self.theta_out_rad = input.theta_out_rad;
@@ -498,8 +506,11 @@ impl Plant {
             viscous_nm_s_per_rad: 0.0,
         });
         let port = self.joint_port(config, load.mass_kg, dt_s);
-        let torque_nm = self.torque_out_nm(config) + input.external_torque_nm + port.torque_nm;
+        let inside_play = self.joint_offset_rad.abs() < 0.5 * port.play_rad;
+        let loss_nm = if inside_play { 0.0 } else { self.rope_loss_nm(config) };
+        let outside_nm = loss_nm + input.external_torque_nm + port.torque_nm;
         let delta_rad = if config.output == OutputBoundary::Arm {
+            let torque_nm = cable_nm + outside_nm;
             let inertia = inertia_kg_m2(&load, port.mass_kg);
             let weight_nm = -port.mass_kg * GRAVITY_M_S2 * load.arm_m * sin(self.theta_out_rad);
             let driven = self.omega_out_rad_s + dt_s * (torque_nm + weight_nm) / inertia;
@@ -508,6 +519,7 @@ impl Plant {
             dt_s * self.omega_out_rad_s
         } else {
             // Without inertia the joint moves until the cables balance load and friction: one Newton step on the torque.
+            let torque_nm = self.torque_out_nm(config) + outside_nm;
             let excess_nm = if torque_nm.abs() > port.coulomb_nm {
                 torque_nm - port.coulomb_nm.copysign(torque_nm)
             } else {
@@ -603,6 +615,24 @@ impl Plant {
             (Some(state), Some(parts)) => state.torque_out_nm(parts),
             _ => 0.0,
         }
+    }
+
+    /// Turns of the output pulley per turn of the input pulley.
+    fn pulley_ratio(&self, config: &PlantConfig) -> f64 {
+        config.transmission.as_ref().map_or(1.0, |parts| {
+            let pulleys = parts.pulleys();
+            pulleys.input_radius_m / pulleys.output_radius_m
+        })
+    }
+
+    /// Torque on the joint from the internal friction of both ropes, N·m.
+    fn rope_loss_nm(&self, config: &PlantConfig) -> f64 {
+        config.transmission.as_ref().map_or(0.0, |parts| {
+            let radius_m = parts.pulleys().output_radius_m;
+            let stiffness_nm_per_rad = 2.0 * radius_m * radius_m / parts.mesh().total_compliance_m_per_n();
+            let lag_rad_s = self.pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
+            ROPE_LOSS_S * stiffness_nm_per_rad * lag_rad_s
+        })
     }
 
     fn stiffness(&self, config: &PlantConfig, end: End) -> f64 {

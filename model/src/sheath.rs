@@ -341,12 +341,13 @@ impl Tendon {
     /// Writes the inner profile of a tendon in full slip.
     fn fill_in(&mut self, mesh: &TendonMesh) {
         let Some(full) = self.full_slip.filter(|_| self.inner_is_stale) else { return };
-        let limits = SlipLimits::new(mesh, full.wrap_friction, full.offset_n);
-        let (steps, sign) =
-            if full.towards_input { (&limits.ratio, -1.0) } else { (&limits.inverse_ratio, 1.0) };
+        let sign = if full.towards_input { -1.0 } else { 1.0 };
+        let even_step = exp(sign * full.wrap_friction / mesh.elements as f64);
         let mut tension = self.tension_n[0];
         for i in 0..mesh.elements {
-            tension = steps[i] * tension + sign * limits.offset_share[i];
+            let share = mesh.wrap_share[i];
+            let step = if mesh.uniform { even_step } else { exp(sign * full.wrap_friction * share) };
+            tension = step * tension + sign * full.offset_n * share;
             self.tension_n[i + 1] = tension;
         }
         self.inner_is_stale = false;

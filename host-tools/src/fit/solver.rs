@@ -10,9 +10,10 @@ use super::objective::{Objective, Part, Residuals, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 
-/// Step of the difference quotients in the optimiser's coordinate: large against the roughness that stick and slip leave
-/// in the residuals, small against their curvature.
-const DIFFERENCE_STEP: f64 = 2e-3;
+/// Steps of the difference quotients in the optimiser's coordinate, one round of the optimiser each. Stick, slip and
+/// impacts make the residuals rough: a coarse step sees the slope through the roughness, a fine one then finds the
+/// place.
+const DIFFERENCE_STEPS: [f64; 2] = [0.1, 0.02];
 
 /// Result of a fit.
 #[derive(Clone, Debug)]
@@ -34,6 +35,7 @@ struct Problem<'a> {
     model: &'a JointModel,
     free: &'a [Free],
     fixed: &'a [bool],
+    step: f64,
     x: DVector<f64>,
     current: Option<Residuals>,
 }
@@ -102,8 +104,8 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
                 }
                 let free = &self.free[j];
                 // Step away from the nearer bound.
-                let ahead = free.value_at(self.x[j] + DIFFERENCE_STEP);
-                let step = if free.at_bound(ahead) { -DIFFERENCE_STEP } else { DIFFERENCE_STEP };
+                let ahead = free.value_at(self.x[j] + self.step);
+                let step = if free.at_bound(ahead) { -self.step } else { self.step };
                 let mut x = self.x.clone();
                 x[j] += step;
                 let there = self.weighted(&self.residuals_at(&x)?, &x);
@@ -134,8 +136,9 @@ pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience:
     }
     let mut fixed = vec![false; free.len()];
     let mut x = DVector::zeros(free.len());
-    for _ in 0..2 {
-        let mut problem = Problem { objective, model, free, fixed: &fixed, x: x.clone(), current: None };
+    let [coarse, fine] = DIFFERENCE_STEPS;
+    for step in [coarse, fine, fine] {
+        let mut problem = Problem { objective, model, free, fixed: &fixed, step, x: x.clone(), current: None };
         problem.set_params(&x);
         let optimiser = LevenbergMarquardt::new()
             .with_patience(patience)
@@ -152,11 +155,11 @@ pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience:
                 newly = true;
             }
         }
-        if !newly || fixed.iter().all(|f| *f) {
+        if (step == fine && !newly) || fixed.iter().all(|f| *f) {
             break;
         }
     }
-    let mut problem = Problem { objective, model, free, fixed: &fixed, x: x.clone(), current: None };
+    let mut problem = Problem { objective, model, free, fixed: &fixed, step: fine, x: x.clone(), current: None };
     problem.set_params(&x);
     let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
     let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();

@@ -180,10 +180,13 @@ fn finite_number(cell: &[u8]) -> Result<f64, String> {
     }
 }
 
-/// Recognises first lines that are no comma-separated header.
+/// Recognises first lines that are no header of a comma-separated table.
 fn refuse_other_headers(names: &[&str]) -> Result<(), String> {
     if names.iter().all(|name| name.trim().parse::<f64>().is_ok()) {
         return Err("the first line holds numbers, expected a header with t_s; add a header line".to_owned());
+    }
+    if names.iter().any(|name| name.contains('\r')) {
+        return Err("lines end in a carriage return alone; save the file with line feeds".to_owned());
     }
     if let [name] = names
         && let Some(separator) = [';', '\t'].into_iter().find(|separator| name.contains(*separator))

@@ -1,4 +1,4 @@
-//! Comma-separated recordings: one header line, one line a sample.
+//! Comma-separated recordings: one header line, one line a sample. No cell spans lines.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 
@@ -7,27 +7,23 @@ use super::place::Places;
 use super::{Column, Origin, READ_BUFFER, ReadOptions, Recording, TIME_ROLE, Tail};
 use crate::outcome::Failure;
 
-type Reader<R> = csv::Reader<BufReader<Tail<R>>>;
-
 /// Reads a table as it streams past; linear in time, and no more memory than the columns that are kept.
 pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Result<Recording, Failure> {
     let mut text = BufReader::with_capacity(READ_BUFFER, Tail::new(data));
     let start = text.fill_buf().map_err(|error| damaged(&source, 0, &error.into()))?;
     let mark = mark_length(start, &source)?;
     text.consume(mark);
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text);
+    let mut lines = Lines::new(text, mark as u64);
 
-    let mut record = csv::ByteRecord::new();
     let mut origin = Origin { source, places: Places::lines(), notes: Vec::new(), passed_over: Vec::new() };
-    if !next(&mut reader, &mut record, &origin.source)? {
+    let Some(header_line) = lines.next(&origin.source)? else {
         return Err(Failure::bad_input(format!(
             "{}:1: the file has no line, expected a header with t_s; record again",
             origin.source
         )));
-    }
-    let header_line = line_of(&record);
+    };
     let names: Vec<String> =
-        record.iter().map(|name| String::from_utf8_lossy(name.trim_ascii()).into()).collect();
+        lines.cells().map(|name| String::from_utf8_lossy(name.trim_ascii()).into()).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut table = Table::from_header(&names, options).map_err(|reason| {
         Failure::bad_input(format!(
@@ -36,25 +32,23 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
         ))
     })?;
 
-    while next(&mut reader, &mut record, &origin.source)? {
-        let line = line_of(&record);
+    while let Some(line) = lines.next(&origin.source)? {
         let row = table.len();
-        let Err(reason) = push(&mut table, &record) else {
+        // Whether this line was cut shows only once the end of the data is reached.
+        let cut = lines.is_unterminated();
+        let whole =
+            if cut && lines.tail().cut_short { Err(String::new()) } else { lines.push_to(&mut table) };
+        let Err(reason) = whole else {
             origin.places.push(row, line);
             continue;
         };
-        let bad = origin.places.describe_number(&origin.source, line);
-        let quote_open = record.iter().any(|cell| cell.contains(&b'\n'));
-        let another = next(&mut reader, &mut record, &origin.source)?;
-        let tail = reader.get_ref().get_ref();
-        if another || quote_open || !(tail.cut_short || tail.ended_within_a_line()) {
-            let reason = if quote_open { "a quote is opened and never closed; remove it" } else { &reason };
-            return Err(Failure::bad_input(format!("{bad}: {reason}")));
+        let place = origin.places.describe_number(&origin.source, line);
+        if !cut || lines.spans_lines() {
+            return Err(Failure::bad_input(format!("{place}: {reason}")));
         }
-        origin.notes.push(format!("{bad}: the file ends within this line; the line was dropped"));
+        origin.notes.push(format!("{place}: the file ends within this line; the line was dropped"));
     }
-    let tail = reader.get_ref().get_ref();
-    if tail.cut_short {
+    if lines.tail().cut_short {
         let whole = table.len();
         origin.notes.push(format!(
             "{}: the gzip data ends early; the {whole} whole samples before the end were used",
@@ -64,22 +58,81 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
     origin.finish(table)
 }
 
-fn push(table: &mut Table, record: &csv::ByteRecord) -> Result<(), String> {
-    if record.len() != table.width() {
-        let (got, expected) = (record.len(), table.width());
-        return Err(format!("{got} fields, expected {expected} as in the header; correct or drop the line"));
-    }
-    table.push(record.iter())
+/// Lines of a table with their numbers. Blank lines are passed over; a carriage return ends a line as part of its end.
+struct Lines<R> {
+    reader: csv::Reader<BufReader<Tail<R>>>,
+    record: csv::ByteRecord,
+    mark: u64,
 }
 
-/// Reads one line; false at the end.
-fn next<R: Read>(
-    reader: &mut Reader<R>,
-    record: &mut csv::ByteRecord,
-    source: &str,
-) -> Result<bool, Failure> {
-    let byte = reader.position().byte();
-    reader.read_byte_record(record).map_err(|error| damaged(source, byte, &error))
+impl<R: Read> Lines<R> {
+    fn new(text: BufReader<Tail<R>>, mark: u64) -> Self {
+        // With the line feed alone as end, the reader's line count is exact also where carriage returns precede it.
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .terminator(csv::Terminator::Any(b'\n'))
+            .from_reader(text);
+        Self { reader, record: csv::ByteRecord::new(), mark }
+    }
+
+    /// Reads a line and returns its number; `None` at the end.
+    fn next(&mut self, source: &str) -> Result<Option<u64>, Failure> {
+        loop {
+            let byte = self.reader.position().byte();
+            let more = self
+                .reader
+                .read_byte_record(&mut self.record)
+                .map_err(|error| damaged(source, byte, &error))?;
+            if !more {
+                return Ok(None);
+            }
+            if self.record.len() > 1 || !self.record[0].trim_ascii().is_empty() {
+                let line_feeds = self.record.as_slice().split(|byte| *byte == b'\n').count() - 1;
+                // A quote that runs to the end of the data has swallowed the last line feed.
+                let swallowed = self.record[self.record.len() - 1].ends_with(b"\n");
+                let ended = u64::from(!self.is_unterminated() && !swallowed);
+                return Ok(Some(self.reader.position().line() - ended - line_feeds as u64));
+            }
+        }
+    }
+
+    /// Whether the data ended before the line did.
+    fn is_unterminated(&self) -> bool {
+        let read = self.reader.position().byte() + self.mark;
+        read == self.tail().bytes && self.tail().last_byte != Some(b'\n')
+    }
+
+    /// Whether a quote runs over the end of a line, which is a quote too many.
+    fn spans_lines(&self) -> bool {
+        self.record.as_slice().contains(&b'\n')
+    }
+
+    fn tail(&self) -> &Tail<R> {
+        self.reader.get_ref().get_ref()
+    }
+
+    /// Cells of the line.
+    fn cells(&self) -> impl Iterator<Item = &[u8]> {
+        let last = self.record.len().saturating_sub(1);
+        self.record.iter().enumerate().map(move |(index, cell)| {
+            if index == last { cell.strip_suffix(b"\r").unwrap_or(cell) } else { cell }
+        })
+    }
+
+    /// Adds the line to the table; the error is what a message says after the place.
+    fn push_to(&self, table: &mut Table) -> Result<(), String> {
+        if self.spans_lines() {
+            return Err("a quote is opened and not closed before the end of the line; remove it".to_owned());
+        }
+        if self.record.len() != table.width() {
+            let (got, expected) = (self.record.len(), table.width());
+            return Err(format!(
+                "{got} fields, expected {expected} as in the header; correct or drop the line"
+            ));
+        }
+        table.push(self.cells())
+    }
 }
 
 fn damaged(source: &str, byte: u64, error: &csv::Error) -> Failure {
@@ -90,10 +143,6 @@ fn damaged(source: &str, byte: u64, error: &csv::Error) -> Failure {
     Failure::bad_input(format!(
         "{source}: after byte {byte} of the table: {reason}; copy or record the file again"
     ))
-}
-
-fn line_of(record: &csv::ByteRecord) -> u64 {
-    record.position().map_or(1, csv::Position::line)
 }
 
 /// Length of the byte order mark with which the text may begin; refuses what is no text.
@@ -130,7 +179,15 @@ pub(super) fn write(recording: &Recording, out: impl Write) -> io::Result<()> {
         for column in recording.columns() {
             match column {
                 Column::Known { values, .. } => write_number(&mut writer, &mut cell, values[sample])?,
-                Column::Unknown(text) => writer.write_field(text.cell(sample).unwrap_or_default())?,
+                Column::Unknown(text) => {
+                    let cell = text.cell(sample).unwrap_or_default();
+                    if cell.contains('\n') {
+                        let name = text.name();
+                        let reason = format!("column `{name}` holds a line break, which a table cannot keep");
+                        return Err(io::Error::other(reason));
+                    }
+                    writer.write_field(cell)?;
+                }
             }
         }
         writer.write_record(None::<&[u8]>)?;

@@ -1,0 +1,216 @@
+//! What a diagnosis says: the content of `diagnosis.json`, schema `bowden-diagnosis/1`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// Value of `schema`.
+pub const SCHEMA: &str = "bowden-diagnosis/1";
+
+/// The diagnosis in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing worth adding or changing.
+    Consistent,
+    /// Parameters were off, no physics is missing.
+    Recalibrate,
+    /// Physics is missing, and named.
+    MissingPhysics,
+    /// Structure is left that no effect of the catalogue explains.
+    Unexplained,
+}
+
+/// A fitted number with its uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Value, SI.
+    pub value: f64,
+    /// Standard deviation; `None` at a bound.
+    pub std: Option<f64>,
+    /// Unit; `1` for a ratio.
+    pub unit: String,
+    /// Whether the value lies at an end of its accepted range.
+    pub at_bound: bool,
+}
+
+/// An effect that could not be excluded beside the named one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rival {
+    /// Identifier.
+    pub id: String,
+    /// Probability that this is the one.
+    pub probability: f64,
+    /// What to record so that the two part.
+    pub separating_experiment: String,
+}
+
+/// An effect that the diagnosis stands behind.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NamedEffect {
+    /// Identifier.
+    pub id: String,
+    /// Part of the joint.
+    pub component: String,
+    /// Probability that it is there.
+    pub probability: f64,
+    /// When it began, s; `None` for one that is always there.
+    pub onset_s: Option<f64>,
+    /// Channel, for an effect of a sensor.
+    pub channel: Option<String>,
+    /// Fitted parameters.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Part of the held-out loss that it removes, 0 to 1.
+    pub heldout_improvement: f64,
+    /// One plain sentence.
+    pub sentence: String,
+    /// What it could be instead.
+    pub rivals: Vec<Rival>,
+}
+
+/// A nominal parameter after recalibration.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Recalibrated {
+    /// `section.name`.
+    pub parameter: String,
+    /// Value in the rig file.
+    pub nominal: f64,
+    /// Value that fits.
+    pub fitted: f64,
+    /// Standard deviation; `None` at a bound.
+    pub std: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// Whether the value lies at an end of its accepted range.
+    pub at_bound: bool,
+}
+
+/// Where recalibrated simulation and recording differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mismatch {
+    /// Part of the joint.
+    pub component: String,
+    /// Channel, or `motor_torque_nm` for the torque that the motor's model lacks.
+    pub channel: String,
+    /// Regime: `reversal`, `hold`, `slow`, `moving`.
+    pub regime: String,
+    /// First time at which the difference stands out, s.
+    pub t_start_s: f64,
+    /// Last such time, s.
+    pub t_end_s: f64,
+    /// Share of the whole difference, 0 to 1.
+    pub share: f64,
+}
+
+/// Structure that no named effect explains.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Part of the joint.
+    pub component: String,
+    /// Channel in which it is strongest.
+    pub channel: String,
+    /// Variables with which it varies.
+    pub depends_on: Vec<String>,
+    /// One plain sentence.
+    pub sentence: String,
+}
+
+/// Differences of one channel, root mean square, in its unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ChannelFit {
+    /// With the rig as it was.
+    pub before_rmse: f64,
+    /// With nominal parameters recalibrated.
+    pub recalibrated_rmse: f64,
+    /// With the diagnosed physics.
+    pub after_rmse: f64,
+    /// What sensors alone would leave.
+    pub noise_rmse: f64,
+}
+
+/// Scores on data that the fit did not see.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fit {
+    /// Always true: the scores are held out.
+    pub heldout: bool,
+    /// One entry a predicted channel.
+    pub channels: BTreeMap<String, ChannelFit>,
+}
+
+/// One diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// In one word.
+    pub verdict: Verdict,
+    /// In two sentences.
+    pub summary: String,
+    /// Effects, most certain first.
+    pub effects: Vec<NamedEffect>,
+    /// Every nominal parameter that was fitted.
+    pub recalibrated: Vec<Recalibrated>,
+    /// Parameters that these data cannot tell apart, each group by `section.name`.
+    pub indistinguishable: Vec<Vec<String>>,
+    /// Where the recalibrated simulation differs, largest share first.
+    pub mismatch: Vec<Mismatch>,
+    /// What no named effect explains.
+    pub unexplained: Option<Unexplained>,
+    /// Scores.
+    pub fit: Fit,
+    /// Name of the rig.
+    pub rig: String,
+    /// Recordings that were fitted.
+    pub recordings: Vec<String>,
+    /// Recordings or stretches that were held out.
+    pub heldout: Vec<String>,
+    /// Program and version that wrote this.
+    pub written_by: String,
+}
+
+/// One channel over time, for the report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// Channel, or `motor_torque_nm`.
+    pub channel: String,
+    /// Unit.
+    pub unit: String,
+    /// Time, s.
+    pub t_s: Vec<f64>,
+    /// Measured.
+    pub measured: Vec<f64>,
+    /// Simulated with the rig as it was.
+    pub before: Vec<f64>,
+    /// Simulated with the diagnosed rig.
+    pub after: Vec<f64>,
+    /// Whether each sample was held out of the fit.
+    pub held_out: Vec<bool>,
+}
+
+/// Root mean square residual of one channel in one regime, in the channel's unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegimeResidual {
+    /// Channel.
+    pub channel: String,
+    /// Unit.
+    pub unit: String,
+    /// Regime: `reversal`, `hold`, `slow`, `moving`.
+    pub regime: String,
+    /// With the rig as it was.
+    pub before_rmse: f64,
+    /// With nominal parameters recalibrated.
+    pub recalibrated_rmse: f64,
+    /// With the diagnosed physics.
+    pub after_rmse: f64,
+}
+
+/// A diagnosis with what a report draws.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Findings {
+    /// The diagnosis.
+    pub diagnosis: Diagnosis,
+    /// Traces of one recording, all compared channels.
+    pub traces: Vec<Trace>,
+    /// Residuals by regime.
+    pub regimes: Vec<RegimeResidual>,
+}
