@@ -7,8 +7,12 @@ use std::panic::PanicHookInfo;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check::CheckArguments, convert::ConvertArguments};
+use crate::commands::{
+    check::CheckArguments, convert::ConvertArguments, fit::FitArguments, replay::ReplayArguments,
+    simulate::SimulateArguments,
+};
 use crate::outcome::{ExitStatus, Failure, Outcome, one_line};
+use crate::progress;
 
 /// Finds which physics a simulated tendon-driven joint lacks, from recordings of the real one
 #[derive(Debug, Parser)]
@@ -32,8 +36,16 @@ struct Cli {
 enum Command {
     /// Read recordings and a rig and say what they hold
     Check(CheckArguments),
+    /// Find which physics the simulation of a rig lacks
+    Diagnose(crate::commands::diagnose::DiagnoseArguments),
     /// Write a recording in another format
     Convert(ConvertArguments),
+    /// Simulate a rig with what went into a recording
+    Replay(ReplayArguments),
+    /// Recalibrate the parameters of a rig to recordings
+    Fit(FitArguments),
+    /// Simulate a rig from a reference: controller, motor, joint and sensors
+    Simulate(SimulateArguments),
 }
 
 /// From now on a panic, which is a defect of this program, says one line and ends the process with exit status 1.
@@ -66,7 +78,11 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
     }
     match &cli.command {
         Command::Check(arguments) => arguments.run(),
+        Command::Diagnose(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Convert(arguments) => arguments.run(),
+        Command::Replay(arguments) => arguments.run(),
+        Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Simulate(arguments) => arguments.run(),
     }
 }
 

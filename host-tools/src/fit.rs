@@ -1,5 +1,7 @@
 //! Recalibration: nominal parameters fitted to recordings, with what the data can and cannot tell.
 
 pub mod free;
+pub mod identifiability;
 pub mod objective;
+pub mod recalibrate;
 pub mod solver;

@@ -38,8 +38,12 @@ pub struct JointModel {
     pub inputs: Vec<Channel>,
     /// Channels that a replay predicts.
     pub outputs: Vec<Channel>,
-    /// Outputs whose zero is arbitrary in every recording.
+    /// Outputs whose zero is arbitrary in every recording; a comparison removes their mean difference.
     pub free_offsets: Vec<Channel>,
+    /// Inputs whose zero is arbitrary in every recording; a replay counts them from their first sample.
+    pub relative_inputs: Vec<Channel>,
+    /// Inputs that a replay averages without phase, and over which time, s.
+    pub smoothing_s: Vec<(Channel, f64)>,
 }
 
 /// How a replay drives the input side.
@@ -124,7 +128,9 @@ impl JointModel {
             servo,
             inputs: roles.inputs,
             outputs: roles.outputs,
-            free_offsets: Vec::new(),
+            free_offsets: rig.free_offsets.clone(),
+            relative_inputs: rig.relative_inputs.clone(),
+            smoothing_s: rig.smoothing_s.clone(),
         })
     }
 }

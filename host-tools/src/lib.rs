@@ -11,4 +11,8 @@ pub mod rig;
 pub mod fit;
 pub mod joint_model;
 pub mod reconstruct;
+pub mod replay;
+pub mod simulate;
 pub mod simulation;
+pub mod diagnose;
+pub mod report;

@@ -1,8 +1,20 @@
 //! The rig file `bowden-rig/1`: what a user believes about the bench.
 //!
-//! Beside the sections of the format, two keys and a section may be given: `simulation.elements`, the number of
+//! Beside the sections of the format, some keys and a section may be given: `simulation.elements`, the number of
 //! slip elements into which a tendon is divided (1 to 64), `simulation.step_s`, the longest simulation step, and
 //! `[controller]`, the law of the position loop, for rigs where it is known.
+//!
+//! `[replay]` may say more about what was recorded:
+//!
+//! ```toml
+//! free_offsets = ["theta_out_rad"]          # outputs with an arbitrary zero in each recording: fits and diagnoses
+//!                                           # remove their mean difference; the prediction itself stays as it is
+//! relative_inputs = ["theta_in_rad"]        # inputs with an arbitrary zero: counted from their first sample
+//! smoothing_s = { torque_out_nm = 0.031 }   # inputs that are averaged without phase, and over which time, up to 1 s
+//! ```
+//!
+//! A rig without `[motor]` whose input angle drives may contain motor effects: they are the friction of the input
+//! spindle, and `torque_in_nm` is then what a sensor outside its bearings shows.
 
 mod document;
 mod effects;
@@ -63,6 +75,12 @@ pub struct Rig {
     pub replay_inputs: Option<Vec<Channel>>,
     /// Outputs of a replay, if the file names them.
     pub replay_outputs: Option<Vec<Channel>>,
+    /// Outputs whose zero is arbitrary in every recording.
+    pub free_offsets: Vec<Channel>,
+    /// Inputs whose zero is arbitrary in every recording.
+    pub relative_inputs: Vec<Channel>,
+    /// Inputs that are averaged without phase, and over which time, s.
+    pub smoothing_s: Vec<(Channel, f64)>,
 }
 
 impl Rig {

@@ -56,19 +56,32 @@ impl ReplayInput {
             if !model.inputs.contains(&channel) {
                 return Ok(None);
             }
-            recording.channel(channel).map(|values| Some(values.to_vec())).ok_or_else(|| {
+            let values = recording.channel(channel).ok_or_else(|| {
                 Failure::bad_input(format!(
                     "{}: no column for the input {}; map one in [recording.columns] or leave it out of replay.inputs",
                     recording.source(),
                     channel.role()
                 ))
-            })
+            })?;
+            let zero = match values.first() {
+                Some(first) if model.relative_inputs.contains(&channel) => *first,
+                _ => 0.0,
+            };
+            let values: Vec<f64> = values.iter().map(|value| value - zero).collect();
+            Ok(Some(match model.smoothing_s.iter().find(|(smoothed, _)| *smoothed == channel) {
+                Some((_, time_s)) => {
+                    moving_average(&values, (0.5 * time_s / median_step_s(recording.t_s())) as usize)
+                }
+                None => values,
+            }))
         };
         let t_s = recording.t_s().to_vec();
         let motion = take(Channel::ThetaIn)?.map(|theta| Motion::from_encoder(&t_s, &theta));
         let duty = take(Channel::Duty)?;
         let theta_ref_rad = take(Channel::ThetaRef)?;
-        let start_rad = motion.as_ref().map(|m| m.theta_rad[0]);
+        // A joint whose angle is no input is taken to stand where its reference begins, until it is told otherwise.
+        let reference_rad = theta_ref_rad.as_ref().and_then(|reference| reference.first().copied());
+        let start_rad = motion.as_ref().map(|m| m.theta_rad[0]).or(reference_rad);
         Ok(Self {
             motion,
             duty,
@@ -86,6 +99,30 @@ impl ReplayInput {
     pub fn start_at(&mut self, theta_rad: f64, omega_rad_s: f64) {
         self.start_rad = Some(theta_rad);
         self.start_rad_s = omega_rad_s;
+    }
+
+    /// Every `every`-th sample of what was prepared, for fits that need less than the recorded rate.
+    #[must_use]
+    pub fn thinned(&self, every: usize) -> Self {
+        let every = every.max(1);
+        let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(every).copied().collect() };
+        let some = |values: &Option<Vec<f64>>| values.as_deref().map(thin);
+        Self {
+            t_s: thin(&self.t_s),
+            motion: self.motion.as_ref().map(|motion| Motion {
+                theta_rad: thin(&motion.theta_rad),
+                omega_rad_s: thin(&motion.omega_rad_s),
+                std_rad: thin(&motion.std_rad),
+                half_count_rad: motion.half_count_rad,
+            }),
+            duty: some(&self.duty),
+            bus_v: some(&self.bus_v),
+            enabled: some(&self.enabled),
+            theta_ref_rad: some(&self.theta_ref_rad),
+            torque_out_nm: some(&self.torque_out_nm),
+            start_rad: self.start_rad,
+            start_rad_s: self.start_rad_s,
+        }
     }
 
     /// Sampling instants, s.
@@ -245,18 +282,19 @@ impl Run<'_> {
 }
 
 /// Angle as it was a fixed time ago.
-struct DelayLine {
+#[derive(Clone, Debug)]
+pub(crate) struct DelayLine {
     delay_s: f64,
     history: std::collections::VecDeque<(f64, f64)>,
     last: f64,
 }
 
 impl DelayLine {
-    fn new(delay_s: f64, start: f64) -> Self {
+    pub(crate) fn new(delay_s: f64, start: f64) -> Self {
         Self { delay_s, history: std::collections::VecDeque::new(), last: start }
     }
 
-    fn at(&mut self, t_s: f64, value: f64) -> f64 {
+    pub(crate) fn at(&mut self, t_s: f64, value: f64) -> f64 {
         if self.delay_s <= 0.0 {
             return value;
         }
@@ -297,7 +335,7 @@ impl<'a> Sampler<'a> {
                 Channel::F2 => f2,
                 Channel::F3 => f3,
                 Channel::F4 => f4,
-                Channel::TorqueIn => plant.torque_in_nm(config),
+                Channel::TorqueIn => plant.driving_torque_nm(config),
                 Channel::TorqueOut => plant.torque_out_nm(config),
                 Channel::MotorCurrent => plant.current_a(),
                 Channel::ThetaRef | Channel::Duty | Channel::BusVoltage | Channel::DriveEnable => 0.0,

@@ -127,7 +127,7 @@ fn commands_check_their_files_before_their_work() {
         "replay @/inputs.csv --rig @/rig.toml --out @/p.csv.gz",
         "fit @/rec.csv @/other.csv --rig @/rig.toml --out @/fitted.toml",
         "diagnose @/rec.csv --rig @/rig.toml --out @/new/folder --heldout @/other.csv",
-        "simulate --rig @/rig.toml --out @/sim.csv --motion any --seconds 1 --rate-hz 500 --seed 7",
+        "simulate --rig @/rig.toml --out @/sim.csv --motion sine --seconds 1 --rate-hz 500 --seed 7",
         "simulate --rig @/rig.toml --out @/sim.mcap --reference @/rec.csv",
     ] {
         prepare(at, line).unwrap_or_else(|message| panic!("{line}: {message}"));
@@ -168,7 +168,7 @@ fn commands_check_their_files_before_their_work() {
             "@/rec.csv: given as training and as held out; a judge must be another recording",
         ),
         (
-            "simulate --rig @/hand.toml --out @/s.csv --motion any",
+            "simulate --rig @/hand.toml --out @/s.csv --motion sine",
             "@/hand.toml:1:1: no [motor], which a forward run needs; add it or use replay",
         ),
         (

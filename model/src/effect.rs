@@ -5,6 +5,7 @@
 //! what it needs to. A hook that an effect leaves out does nothing; an effect that is not active costs nothing.
 
 use crate::channel::Channel;
+use crate::parameters::FrictionLaw;
 
 /// Largest number of parameters that one effect may have.
 pub const MAX_PARAMETERS: usize = 6;
@@ -70,6 +71,8 @@ pub struct ParameterSpec {
     pub scale: Scale,
     /// What the parameter means, one line.
     pub meaning: &'static str,
+    /// Whether a search for missing physics fits it; otherwise it keeps what the file or the default says.
+    pub searched: bool,
 }
 
 impl ParameterSpec {
@@ -82,7 +85,7 @@ impl ParameterSpec {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        Self { name, unit, lower, upper, default, scale: Scale::Linear, meaning }
+        Self { name, unit, lower, upper, default, scale: Scale::Linear, meaning, searched: true }
     }
 
     /// Positive parameter whose steps are ratios.
@@ -94,7 +97,14 @@ impl ParameterSpec {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        Self { name, unit, lower, upper, default, scale: Scale::Log, meaning }
+        Self { name, unit, lower, upper, default, scale: Scale::Log, meaning, searched: true }
+    }
+
+    /// The same parameter, left alone by a search for missing physics.
+    #[must_use]
+    pub const fn not_searched(mut self) -> Self {
+        self.searched = false;
+        self
     }
 }
 
@@ -163,6 +173,9 @@ pub struct MotorPort {
     pub motor_torque_nm: f64,
     /// Torque of the load on the input pulley, N·m; positive accelerates it.
     pub load_torque_nm: f64,
+    /// Torque that the gear carries, N·m ≥ 0: that of the load behind elastic tendons; where gear and load are one rigid
+    /// body, the larger of motor and load, because inertia takes part of either.
+    pub carried_torque_nm: f64,
     /// Torque that an effect adds, N·m at the input pulley; positive accelerates it.
     pub torque_nm: f64,
     /// Level of dry friction, N·m ≥ 0; it opposes motion and never reverses it.
@@ -195,6 +208,18 @@ pub struct TendonPort {
     pub added_length_m: f64,
     /// Whether the tendon goes slack instead of pushing.
     pub unilateral: bool,
+    /// Travel over which a contact gives way before it slips, m; zero for rigid contacts.
+    pub presliding_m: f64,
+}
+
+impl TendonPort {
+    /// Speed at which slip from each end happens, m/s ≥ 0: the mean of both ends while the tendon runs through the
+    /// sheath, else that of the end itself.
+    #[must_use]
+    pub fn slip_speeds_m_s(&self) -> [f64; 2] {
+        let [input, output] = self.speed_m_s;
+        if input * output > 0.0 { [0.5 * (input + output).abs(); 2] } else { [input.abs(), output.abs()] }
+    }
 }
 
 /// Both tendons between the pulleys.
@@ -258,6 +283,11 @@ pub struct SensorPort {
 pub trait Effect: Sync {
     /// Name, component and parameters.
     fn descriptor(&self) -> &'static Descriptor;
+
+    /// Law of sheath friction that replaces the rig's when the simulation is set up.
+    fn friction_law(&self) -> Option<FrictionLaw> {
+        None
+    }
 
     /// Changes what drives the winding.
     fn drive(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut DrivePort) {
@@ -374,7 +404,7 @@ impl core::fmt::Debug for ActiveEffect {
             .field("id", &self.descriptor().id)
             .field("parameters", &&self.parameters[..self.descriptor().parameters.len()])
             .field("target", &self.target)
-            .finish()
+            .finish_non_exhaustive()
     }
 }
 

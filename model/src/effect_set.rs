@@ -6,6 +6,7 @@ use crate::effect::{
     ActiveEffect, Component, DrivePort, EffectState, JointPort, MAX_PARAMETERS, MAX_STATE, MotorPort,
     SensorPort, TransmissionPort,
 };
+use crate::parameters::FrictionLaw;
 
 /// Largest number of effects in one simulation.
 pub const MAX_ACTIVE: usize = 12;
@@ -71,6 +72,12 @@ impl EffectSet {
     #[must_use]
     pub fn touches(&self, component: Component) -> bool {
         self.iter().any(|effect| effect.descriptor().component == component)
+    }
+
+    /// Law of sheath friction with these effects, for a rig that says `nominal`; the last effect that has one decides.
+    #[must_use]
+    pub fn friction_law(&self, nominal: FrictionLaw) -> FrictionLaw {
+        self.iter().filter_map(|active| active.effect.friction_law()).last().unwrap_or(nominal)
     }
 
     fn for_each(

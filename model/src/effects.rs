@@ -4,6 +4,7 @@
 
 mod asymmetric_friction;
 mod bending_friction;
+mod distributed_friction;
 mod drive_dead_zone;
 mod encoder_eccentricity;
 mod end_stop_contact;
@@ -19,6 +20,7 @@ mod motor_coulomb_friction;
 mod motor_stribeck_friction;
 mod motor_viscous_friction;
 mod payload_change;
+mod presliding_compliance;
 mod pretension_loss;
 mod sensor_gain_error;
 mod sensor_lag;
@@ -37,6 +39,7 @@ mod wrap_angle_varies_with_pose;
 use crate::effect::Effect;
 use asymmetric_friction::AsymmetricFriction;
 use bending_friction::BendingFriction;
+use distributed_friction::DistributedFriction;
 use drive_dead_zone::DriveDeadZone;
 use encoder_eccentricity::EncoderEccentricity;
 use end_stop_contact::EndStopContact;
@@ -52,6 +55,7 @@ use motor_coulomb_friction::MotorCoulombFriction;
 use motor_stribeck_friction::MotorStribeckFriction;
 use motor_viscous_friction::MotorViscousFriction;
 use payload_change::PayloadChange;
+use presliding_compliance::PreslidingCompliance;
 use pretension_loss::PretensionLoss;
 use sensor_gain_error::SensorGainError;
 use sensor_lag::SensorLag;
@@ -68,7 +72,7 @@ use wrap_angle_disturbed::WrapAngleDisturbed;
 use wrap_angle_varies_with_pose::WrapAngleVariesWithPose;
 
 /// All effects, input to output.
-pub static CATALOGUE: [&dyn Effect; 31] = [
+pub static CATALOGUE: [&dyn Effect; 33] = [
     &MotorCoulombFriction,
     &MotorViscousFriction,
     &MotorStribeckFriction,
@@ -77,8 +81,10 @@ pub static CATALOGUE: [&dyn Effect; 31] = [
     &MotorCogging,
     &DriveDeadZone,
     &WindingHeating,
+    &DistributedFriction,
     &SheathViscousFriction,
     &SheathStribeckFriction,
+    &PreslidingCompliance,
     &BendingFriction,
     &AsymmetricFriction,
     &FrictionDrift,

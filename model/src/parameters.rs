@@ -11,7 +11,7 @@ pub struct MotorParameters {
     pub resistance_ohm: f64,
     /// Winding inductance, H.
     pub inductance_h: f64,
-    /// Torque constant k_t, N·m/A; also the back-EMF constant, V·s/rad.
+    /// Torque constant `k_t`, N·m/A; also the back-EMF constant, V·s/rad.
     pub torque_constant_nm_per_a: f64,
     /// Gear ratio N: rotor turns per turn of the input pulley.
     pub gear_ratio: f64,
@@ -157,6 +157,7 @@ macro_rules! nominal {
                 default: $typical,
                 scale: Scale::$scale,
                 meaning: $meaning,
+                searched: true,
             },
             get: |joint| joint.$section.map(|part| part.$name),
             slot: |joint| joint.$section.as_mut().map(|part| &mut part.$name),
@@ -186,7 +187,7 @@ pub static NOMINAL_PARAMETERS: [NominalParameter; 18] = [
     nominal!(tendon.length_m, "m", 0.01, 50.0, 1.0, Log, "length of a tendon"),
     nominal!(tendon.axial_stiffness_n, "N", 10.0, 1e8, 72_900.0, Log, "axial stiffness EA of a tendon"),
     nominal!(tendon.pretension_n, "N", 0.01, 1e4, 30.0, Log, "pretension"),
-    nominal!(sheath.wrap_angle_rad, "rad", 0.0, 100.0, 3.14, Linear, "wrap angle"),
+    nominal!(sheath.wrap_angle_rad, "rad", 0.0, 100.0, core::f64::consts::PI, Linear, "wrap angle"),
     nominal!(sheath.friction_coefficient, "1", 0.0, 2.0, 0.12, Linear, "friction coefficient"),
     nominal!(load.mass_kg, "kg", 0.0, 1e3, 2.5, Linear, "weight at the arm's end"),
     nominal!(load.arm_m, "m", 0.0, 10.0, 0.03, Linear, "distance of the weight from the axis"),

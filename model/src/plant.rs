@@ -29,6 +29,10 @@ const PLAY_RELAXATION: f64 = 0.8;
 /// half; without any loss the arm would bounce for seconds, which no bench does.
 const IMPACT_LOSS: f64 = 0.5;
 
+/// Turn over which the dry friction of a spindle builds up after a reversal, rad: balls and seals give way elastically by
+/// some thousandths of a turn. A prescribed angle leaves the friction of a spindle at rest undetermined without it.
+const SPINDLE_PRESLIDING_RAD: f64 = 3e-3;
+
 /// Internal friction of the ropes: the torque of a stretch rate, as a time. A wire rope loses some 5 % of its elastic
 /// energy per cycle near 20 Hz, which gives half a millisecond; without it the arm would ring for seconds after each
 /// start. At steady speed it does nothing.
@@ -122,7 +126,7 @@ impl PlantConfig {
                 pulleys,
                 tendon,
                 parameters.sheath,
-                parameters.friction,
+                effects.friction_law(parameters.friction),
                 elements,
             )?),
             (Some(_), None) => return Err(PlantError::PulleysMissing),
@@ -240,6 +244,8 @@ pub struct Plant {
     omega_out_rad_s: f64,
     gear_offset_rad: f64,
     joint_offset_rad: f64,
+    spindle_presliding: f64,
+    spindle_friction_nm: f64,
     transmission: Option<Transmission>,
     states: EffectStates,
 }
@@ -259,6 +265,8 @@ impl Plant {
             omega_out_rad_s: 0.0,
             gear_offset_rad: 0.0,
             joint_offset_rad: 0.0,
+            spindle_presliding: 0.0,
+            spindle_friction_nm: 0.0,
             transmission: config.transmission.as_ref().map(Transmission::at_rest),
             states: FRESH_STATES,
         }
@@ -386,7 +394,7 @@ impl Plant {
         }
         match (config.input, motor) {
             (InputBoundary::Motor, Some(motor)) => {
-                let load_nm = -self.torque_in_nm(config) - self.rope_loss_nm(config) * self.pulley_ratio(config);
+                let load_nm = -self.torque_in_nm(config) - self.rope_loss_nm(config) * Self::pulley_ratio(config);
                 let play_rad = self.turn_rotor(config, motor, load_nm, input.input_torque_nm, dt_s);
                 let delta_rad = dt_s * self.omega_motor_rad_s;
                 self.theta_motor_rad += delta_rad;
@@ -408,8 +416,19 @@ impl Plant {
                 self.omega_in_rad_s = delta_rad / dt_s;
                 self.turn_input(config, delta_rad);
                 self.follow_with_rotor(config, motor, dt_s);
+                if motor.is_none() && config.effects.touches(Component::Motor) {
+                    self.rub_spindle(config, delta_rad, dt_s);
+                }
             }
         }
+    }
+
+    /// Friction between a spindle that is turned from outside and its bearings.
+    fn rub_spindle(&mut self, config: &PlantConfig, delta_rad: f64, dt_s: f64) {
+        let load_nm = -self.torque_in_nm(config);
+        let port = self.motor_port(config, 0.0, load_nm, load_nm.abs(), dt_s);
+        self.spindle_presliding = (self.spindle_presliding + delta_rad / SPINDLE_PRESLIDING_RAD).clamp(-1.0, 1.0);
+        self.spindle_friction_nm = port.coulomb_nm * self.spindle_presliding - port.torque_nm;
     }
 
     /// Rotor behind a pulley that moves as prescribed: rigid without play, free inside a play.
@@ -441,7 +460,7 @@ impl Plant {
         dt_s: f64,
     ) -> f64 {
         let motor_nm = pulley_torque_constant_nm_per_a(motor) * self.current_a;
-        let port = self.motor_port(config, motor_nm, load_nm, dt_s);
+        let port = self.motor_port(config, motor_nm, load_nm, load_nm.abs(), dt_s);
         let inertia = pulley_inertia_kg_m2(motor);
         let torque_nm = motor_nm + load_nm + outside_nm + port.torque_nm;
         let driven = self.omega_motor_rad_s + dt_s * torque_nm / inertia;
@@ -455,6 +474,7 @@ impl Plant {
         config: &PlantConfig,
         motor_torque_nm: f64,
         load_torque_nm: f64,
+        carried_torque_nm: f64,
         dt_s: f64,
     ) -> MotorPort {
         let mut port = MotorPort {
@@ -464,6 +484,7 @@ impl Plant {
             omega_rad_s: self.omega_motor_rad_s,
             motor_torque_nm,
             load_torque_nm,
+            carried_torque_nm,
             torque_nm: 0.0,
             coulomb_nm: 0.0,
             gear_play_rad: 0.0,
@@ -507,31 +528,28 @@ impl Plant {
         });
         let port = self.joint_port(config, load.mass_kg, dt_s);
         let inside_play = self.joint_offset_rad.abs() < 0.5 * port.play_rad;
-        let loss_nm = if inside_play { 0.0 } else { self.rope_loss_nm(config) };
+        // A joint without inertia cannot ring; there the speed of the last correction would only feed back into the next.
+        let loss_nm = if inside_play || config.output == OutputBoundary::Torque {
+            0.0
+        } else {
+            self.rope_loss_nm(config)
+        };
         let outside_nm = loss_nm + input.external_torque_nm + port.torque_nm;
-        let delta_rad = if config.output == OutputBoundary::Arm {
+        if config.output == OutputBoundary::Arm {
             let torque_nm = cable_nm + outside_nm;
             let inertia = inertia_kg_m2(&load, port.mass_kg);
             let weight_nm = -port.mass_kg * GRAVITY_M_S2 * load.arm_m * sin(self.theta_out_rad);
             let driven = self.omega_out_rad_s + dt_s * (torque_nm + weight_nm) / inertia;
             let dry = after_dry_friction_rad_s(driven, port.coulomb_nm, inertia, dt_s);
             self.omega_out_rad_s = dry / (1.0 + dt_s * load.viscous_nm_s_per_rad / inertia);
-            dt_s * self.omega_out_rad_s
+            let delta_rad = dt_s * self.omega_out_rad_s;
+            self.theta_out_rad += delta_rad;
+            self.turn_output(config, delta_rad);
         } else {
-            // Without inertia the joint moves until the cables balance load and friction: one Newton step on the torque.
-            let torque_nm = self.torque_out_nm(config) + outside_nm;
-            let excess_nm = if torque_nm.abs() > port.coulomb_nm {
-                torque_nm - port.coulomb_nm.copysign(torque_nm)
-            } else {
-                0.0
-            };
-            let delta_rad =
-                excess_nm / (self.stiffness(config, End::Output) + load.viscous_nm_s_per_rad / dt_s);
-            self.omega_out_rad_s = delta_rad / dt_s;
-            delta_rad
-        };
-        self.theta_out_rad += delta_rad;
-        self.turn_output(config, delta_rad);
+            let before_rad = self.theta_out_rad;
+            self.balance_output(config, outside_nm, port.coulomb_nm, load.viscous_nm_s_per_rad / dt_s);
+            self.omega_out_rad_s = (self.theta_out_rad - before_rad) / dt_s;
+        }
         if port.play_rad > 0.0 || self.joint_offset_rad != 0.0 {
             // The pulley leads the arm by the offset; inside the play it carries no torque.
             let wanted = self.joint_offset_rad
@@ -544,6 +562,41 @@ impl Plant {
             }
             self.turn_output(config, offset - self.joint_offset_rad);
             self.joint_offset_rad = offset;
+        }
+    }
+
+    /// Turns a joint without inertia until the cables balance load and friction, `drag_nm_per_rad` for the turn taken.
+    ///
+    /// Newton steps on the torque. Along a turn the cables only soften, so that the slope of the last turn falls short
+    /// rather than beyond; a turn that begins takes the slope of cables that stick everywhere, because the one from
+    /// before a reversal is too soft and would throw the joint to and fro.
+    fn balance_output(&mut self, config: &PlantConfig, outside_nm: f64, coulomb_nm: f64, drag_nm_per_rad: f64) {
+        /// Newton steps at most; what is left then is taken up by the next simulation step.
+        const STEPS: usize = 30;
+        /// Turn below which the joint counts as balanced, rad; far below any encoder.
+        const BALANCED_RAD: f64 = 1e-8;
+        /// Longest single turn, rad: a step across free play.
+        const LONGEST_RAD: f64 = 0.1;
+        let sticking = config.transmission.as_ref().map_or(f64::INFINITY, |parts| {
+            parts.sticking_stiffness_nm_per_rad(End::Output)
+        });
+        let (mut turned_rad, mut last_rad) = (0.0, 0.0);
+        for _ in 0..STEPS {
+            let torque_nm = self.torque_out_nm(config) + outside_nm - drag_nm_per_rad * turned_rad;
+            if torque_nm.abs() <= coulomb_nm {
+                break;
+            }
+            let excess_nm = torque_nm - coulomb_nm.copysign(torque_nm);
+            let goes_on = excess_nm * last_rad > 0.0;
+            let stiffness = if goes_on { self.stiffness(config, End::Output) } else { sticking };
+            let delta_rad = (excess_nm / (stiffness + drag_nm_per_rad)).clamp(-LONGEST_RAD, LONGEST_RAD);
+            last_rad = delta_rad;
+            self.theta_out_rad += delta_rad;
+            self.turn_output(config, delta_rad);
+            turned_rad += delta_rad;
+            if delta_rad.abs() < BALANCED_RAD {
+                break;
+            }
         }
     }
 
@@ -575,7 +628,8 @@ impl Plant {
         let weight_nm = -joint.mass_kg * GRAVITY_M_S2 * load.arm_m * sin(self.theta_out_rad);
         let load_nm = weight_nm + joint.torque_nm + input.external_torque_nm;
         let motor_nm = pulley_torque_constant_nm_per_a(motor) * self.current_a;
-        let port = self.motor_port(config, motor_nm, load_nm, dt_s);
+        let carried_nm = motor_nm.abs().max(load_nm.abs());
+        let port = self.motor_port(config, motor_nm, load_nm, carried_nm, dt_s);
         let inertia = pulley_inertia_kg_m2(motor) + inertia_kg_m2(&load, joint.mass_kg);
         let viscous = motor.viscous_nm_s_per_rad + load.viscous_nm_s_per_rad;
         let driven = self.omega_motor_rad_s + dt_s * (motor_nm + load_nm + port.torque_nm) / inertia;
@@ -608,6 +662,13 @@ impl Plant {
         }
     }
 
+    /// Torque that turns the input pulley, N·m, as a sensor between it and what turns it shows: that of the cables and,
+    /// where a prescribed angle replaces the motor, the friction of the spindle (motor effects of a joint without motor).
+    #[must_use]
+    pub fn driving_torque_nm(&self, config: &PlantConfig) -> f64 {
+        self.torque_in_nm(config) + self.spindle_friction_nm
+    }
+
     /// Torque of the cables on the joint, N·m; zero without tendons.
     #[must_use]
     pub fn torque_out_nm(&self, config: &PlantConfig) -> f64 {
@@ -618,7 +679,7 @@ impl Plant {
     }
 
     /// Turns of the output pulley per turn of the input pulley.
-    fn pulley_ratio(&self, config: &PlantConfig) -> f64 {
+    fn pulley_ratio(config: &PlantConfig) -> f64 {
         config.transmission.as_ref().map_or(1.0, |parts| {
             let pulleys = parts.pulleys();
             pulleys.input_radius_m / pulleys.output_radius_m
@@ -630,7 +691,7 @@ impl Plant {
         config.transmission.as_ref().map_or(0.0, |parts| {
             let radius_m = parts.pulleys().output_radius_m;
             let stiffness_nm_per_rad = 2.0 * radius_m * radius_m / parts.mesh().total_compliance_m_per_n();
-            let lag_rad_s = self.pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
+            let lag_rad_s = Self::pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
             ROPE_LOSS_S * stiffness_nm_per_rad * lag_rad_s
         })
     }

@@ -4,10 +4,11 @@
 //! between segments `i` and `i + 1` covers the share `w_i` of the wrap angle `K` and sticks as long as
 //!
 //! ```text
-//! e^{-μ K w_i} T_i - q K w_i  ≤  T_{i+1}  ≤  e^{+μ K w_i} T_i + q K w_i
+//! e^{-μ K w_i} T_i - o_i  ≤  T_{i+1}  ≤  e^{+μ K w_i} (T_i + o_i),    o_i = q (1 - e^{-μ K w_i}) / μ
 //! ```
 //!
 //! with friction coefficient μ and a part `q` (N/rad) that does not scale with tension; the nominal model has `q = 0`.
+//! This is `dT/dφ = ±(μ T + q)` over the contact's wrap, the same seen from either end.
 //! Inertia of the tendon is neglected. When an end moves, contacts slip one after the other from that end inwards: the
 //! *front*. Behind the front every contact is at its limit, so the slipping tensions follow from the end tension
 //! `T_j = P_j T_0 + G_j`, and `T_0` from the elongation of the slipping part, which is known because the first sticking
@@ -22,7 +23,9 @@
 //! Sources: Kaneko et al. 1991 (distributed friction, partial slip); Agrawal et al., IEEE Trans. Robot. 26 (2010) 914
 //! (travelling front). The discrete front is derived in `docs/derivation.md`.
 
-use libm::exp;
+pub mod presliding;
+
+use libm::{exp, expm1};
 
 /// Largest number of contacts of one tendon.
 pub const MAX_ELEMENTS: usize = 64;
@@ -177,6 +180,9 @@ impl SlipLimits {
     /// Replaces the limits; costs nothing when nothing changed.
     pub fn set(&mut self, mesh: &TendonMesh, wrap_friction: f64, offset_n: f64) {
         let n = mesh.elements;
+        if wrap_friction == self.wrap_friction && offset_n == self.offset_n {
+            return;
+        }
         if wrap_friction != self.wrap_friction {
             self.wrap_friction = wrap_friction;
             if mesh.uniform {
@@ -190,13 +196,21 @@ impl SlipLimits {
                 }
             }
         }
-        if offset_n != self.offset_n {
-            self.offset_n = offset_n;
-            for (share, wrap) in self.offset_share.iter_mut().zip(&mesh.wrap_share) {
-                *share = offset_n * wrap;
+        self.offset_n = offset_n;
+        if mesh.uniform {
+            self.offset_share[..n].fill(contact_offset_n(wrap_friction, offset_n, mesh.wrap_share[0]));
+        } else {
+            for (share, wrap) in self.offset_share[..n].iter_mut().zip(&mesh.wrap_share) {
+                *share = contact_offset_n(wrap_friction, offset_n, *wrap);
             }
         }
     }
+}
+
+/// `o = q K w (1 - e^{-x}) / x`, `x = μ K w`: what a contact holds at zero tension behind it, N.
+fn contact_offset_n(wrap_friction: f64, offset_n: f64, share: f64) -> f64 {
+    let x = wrap_friction * share;
+    if offset_n == 0.0 || x < 1e-12 { offset_n * share } else { -offset_n * share * expm1(-x) / x }
 }
 
 /// A tendon whose contacts all slip the same way: the profile is known from one end.
@@ -286,8 +300,14 @@ impl Tendon {
         stretched - self.slack_m[0] - self.slack_m[1]
     }
 
-    /// Makes the unloaded tendon longer by `length_m` at fixed ends, evenly along its length.
-    pub fn add_length(&mut self, mesh: &TendonMesh, length_m: f64) {
+    /// Makes the unloaded tendon longer by `length_m` at fixed ends, evenly along its length; shortening takes up slack
+    /// first.
+    pub fn add_length(&mut self, mesh: &TendonMesh, mut length_m: f64) {
+        for slack_m in &mut self.slack_m {
+            let taken = slack_m.min(-length_m).max(0.0);
+            *slack_m -= taken;
+            length_m += taken;
+        }
         self.fill_in(mesh);
         self.full_slip = None;
         let drop_n = length_m / mesh.total_compliance_m_per_n;
@@ -347,7 +367,8 @@ impl Tendon {
         for i in 0..mesh.elements {
             let share = mesh.wrap_share[i];
             let step = if mesh.uniform { even_step } else { exp(sign * full.wrap_friction * share) };
-            tension = step * tension + sign * full.offset_n * share;
+            let offset = contact_offset_n(full.wrap_friction, full.offset_n, share);
+            tension = if full.towards_input { step * tension - offset } else { step * (tension + offset) };
             self.tension_n[i + 1] = tension;
         }
         self.inner_is_stale = false;
@@ -373,7 +394,10 @@ impl Tendon {
         }
         let pulled = pull_m >= 0.0;
         let steps = if pulled { &limits.ratio } else { &limits.inverse_ratio };
-        let offset_sign = if pulled { -1.0 } else { 1.0 };
+        let offset_n = |i: usize, step: f64| {
+            let offset = limits.offset_share[contact(i)];
+            if pulled { -offset } else { step * offset }
+        };
 
         // Of the slipping part: elongation, and compliance sums of P_j and G_j; T_0 = (elongation - h) / s.
         let first_compliance = mesh.compliance_m_per_n[segment(0)];
@@ -384,7 +408,7 @@ impl Tendon {
         while front < n {
             let next = self.tension_n[segment(front + 1)];
             let step = steps[contact(front)];
-            let offset = offset_sign * limits.offset_share[contact(front)];
+            let offset = offset_n(front, step);
             // Tension behind the front, times s > 0, which saves a division per contact.
             let limit_s = step * (p * (elongation_m - h) + g * s) + offset * s;
             let sticks = if pulled { limit_s <= next * s } else { limit_s >= next * s };
@@ -401,6 +425,14 @@ impl Tendon {
         }
         self.front[end] = front;
         self.stiffness_n_per_m[end] = 1.0 / s;
+        let other = usize::from(!FROM_OUTPUT);
+        if front == n && unilateral && self.slack_m[other] > 0.0 {
+            // The pull has reached the other end, where the tendon hangs loose: that is taken up before the end tightens.
+            let other_tension_n = p * ((elongation_m - h) / s) + g;
+            let taken = (other_tension_n * s / p).clamp(0.0, self.slack_m[other]);
+            self.slack_m[other] -= taken;
+            elongation_m -= taken;
+        }
         let mut tension = (elongation_m - h) / s;
         if tension < 0.0 {
             if !unilateral {
@@ -413,7 +445,7 @@ impl Tendon {
             }
             self.slack_m[end] += h - elongation_m;
             tension = 0.0;
-        } else if front == n {
+        } else if front == n && self.slack_m == [0.0; 2] {
             self.full_slip = Some(FullSlip {
                 towards_input: pulled != FROM_OUTPUT,
                 wrap_friction: limits.wrap_friction,
@@ -425,7 +457,8 @@ impl Tendon {
         }
         self.tension_n[segment(0)] = tension;
         for i in 0..front {
-            tension = steps[contact(i)] * tension + offset_sign * limits.offset_share[contact(i)];
+            let step = steps[contact(i)];
+            tension = step * tension + offset_n(i, step);
             self.tension_n[segment(i + 1)] = tension;
         }
     }

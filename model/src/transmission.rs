@@ -70,6 +70,17 @@ impl TransmissionConfig {
         self.pulleys
     }
 
+    /// Slope of the torque over a turn of one pulley while the contacts next to it stick, N·m/rad: the stiffest there is.
+    #[must_use]
+    pub fn sticking_stiffness_nm_per_rad(&self, end: End) -> f64 {
+        let radius_m = match end {
+            End::Input => self.pulleys.input_radius_m,
+            End::Output => self.pulleys.output_radius_m,
+        };
+        // Half an element of each tendon.
+        4.0 * self.mesh.elements() as f64 / self.mesh.total_compliance_m_per_n() * radius_m * radius_m
+    }
+
     fn nominal_tendon_port(&self) -> TendonPort {
         let slip =
             SlipLaw { friction_coefficient: self.sheath.friction_coefficient, friction_n_per_rad: 0.0 };
@@ -80,6 +91,7 @@ impl TransmissionConfig {
             mean_tension_n: self.tendon.pretension_n,
             added_length_m: 0.0,
             unilateral: false,
+            presliding_m: 0.0,
         }
     }
 }
@@ -91,6 +103,7 @@ pub struct Transmission {
     limits: [[SlipLimits; 2]; 2],
     added_length_m: [f64; 2],
     unilateral: [bool; 2],
+    presliding_m: [f64; 2],
     play_rad: f64,
     play_offset_rad: f64,
 }
@@ -106,6 +119,7 @@ impl Transmission {
             limits: [[limits; 2]; 2],
             added_length_m: [0.0; 2],
             unilateral: [false; 2],
+            presliding_m: [0.0; 2],
             play_rad: 0.0,
             play_offset_rad: 0.0,
         }
@@ -202,6 +216,7 @@ impl Transmission {
                 self.added_length_m[index] = tendon.added_length_m;
             }
             self.unilateral[index] = tendon.unilateral;
+            self.presliding_m[index] = tendon.presliding_m;
         }
         self.play_rad = port.play_rad;
     }
@@ -233,7 +248,13 @@ impl Transmission {
         };
         for (index, sign) in CABLE_SIGN.into_iter().enumerate() {
             let limits = &self.limits[index][end as usize];
-            self.tendons[index].move_end(&config.mesh, limits, end, sign * pull_m, self.unilateral[index]);
+            let (pull_m, unilateral) = (sign * pull_m, self.unilateral[index]);
+            let (tendon, presliding_m) = (&mut self.tendons[index], self.presliding_m[index]);
+            if presliding_m > 0.0 {
+                tendon.move_end_presliding(&config.mesh, limits, end, pull_m, unilateral, presliding_m);
+            } else {
+                tendon.move_end(&config.mesh, limits, end, pull_m, unilateral);
+            }
         }
     }
 }

@@ -1,11 +1,15 @@
 //! `bowden diagnose`: which physics the rig's simulation lacks.
 
+use std::io::Write;
 use std::path::PathBuf;
 
-use super::{all_paths, load_recordings};
-use crate::outcome::Failure;
+use super::{all_paths, load_recordings, outcome_of, print};
+use crate::diagnose::diagnose;
+use crate::outcome::{Failure, Outcome};
 use crate::output;
+use crate::progress::Progress;
 use crate::recording::Recording;
+use crate::report;
 use crate::rig::{Rig, RigDocument};
 
 /// Files that a diagnosis writes into its folder: result, report, rig with the effects found.
@@ -67,5 +71,23 @@ impl DiagnoseArguments {
         let heldout = load_recordings(&rig, &self.heldout)?;
         output::prepare_folder(&self.out, &FILES, &inputs)?;
         Ok(DiagnoseTask { rig, document, training, heldout, out: self.out.clone() })
+    }
+
+    /// Diagnoses the recordings and writes result, report and rig.
+    ///
+    /// # Errors
+    /// What makes an input unusable, or the reason why no result can be written.
+    pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
+        let mut task = self.prepare()?;
+        let diagnosed = diagnose(&task.rig, &task.training, &task.heldout, progress)?;
+        let [result, page, rig] = FILES.map(|name| task.out.join(name));
+        let json = serde_json::to_string_pretty(&diagnosed.findings.diagnosis)
+            .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
+        output::write_file(&result, |file| writeln!(file, "{json}"))?;
+        output::write_file(&page, |file| file.write_all(report::render(&diagnosed.findings).as_bytes()))?;
+        diagnosed.write_into(&mut task.document)?;
+        task.document.save(&rig)?;
+        print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
+        Ok(outcome_of(task.training.iter().chain(&task.heldout)))
     }
 }

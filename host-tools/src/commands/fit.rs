@@ -1,10 +1,14 @@
 //! `bowden fit`: recalibrates the nominal parameters of a rig.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
-use super::{all_paths, load_recordings};
-use crate::outcome::Failure;
+use super::{all_paths, load_recordings, outcome_of, print};
+use crate::fit::objective::Series;
+use crate::fit::recalibrate::{FittedParameter, Recalibration, recalibrate};
+use crate::outcome::{Failure, Outcome};
 use crate::output;
+use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::rig::{Rig, RigDocument};
 
@@ -36,6 +40,19 @@ pub struct FitTask {
 }
 
 impl FitArguments {
+    /// Fits, writes the fitted rig and prints what changed and what stays unknown.
+    ///
+    /// # Errors
+    /// See [`FitArguments::prepare`] and [`recalibrate`].
+    pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
+        let mut task = self.prepare()?;
+        let result = recalibrate(&task.rig, &task.recordings, progress)?;
+        result.write_to(&mut task.document)?;
+        task.document.save(&task.out)?;
+        print(&table(&result))?;
+        Ok(outcome_of(&task.recordings))
+    }
+
     /// Checks the output and reads the inputs.
     ///
     /// # Errors
@@ -49,4 +66,42 @@ impl FitArguments {
         let recordings = load_recordings(&rig, &self.recordings)?;
         Ok(FitTask { rig, document, recordings, out: self.out.clone() })
     }
+}
+
+/// The result as text: parameters, channels, and what the recordings leave open.
+fn table(result: &Recalibration) -> String {
+    let mut text =
+        format!("{:<32}{:>12}  {:>12}   {:<14}{}\n", "parameter", "nominal", "fitted", "± std", "unit");
+    for parameter in &result.parameters {
+        let _ = writeln!(text, "{}", row(parameter));
+    }
+    let _ = writeln!(text, "\n{:<32}{:>12}  {:>12}   {:<14}unit", "RMS difference", "nominal", "fitted", "");
+    for channel in &result.channels {
+        let (name, unit) = match channel.series {
+            Series::Channel(channel) => (channel.role(), channel.unit()),
+            Series::Guide => ("torque missing at the motor", "N m"),
+        };
+        let _ =
+            writeln!(text, "{name:<32}{:>12.4}  {:>12.4}   {:<14}{unit}", channel.before, channel.after, "");
+    }
+    if !result.groups.is_empty() {
+        let _ = writeln!(text, "\nThe recordings cannot tell these apart; only the product is known:");
+        for group in &result.groups {
+            let _ = writeln!(text, "  {group}");
+        }
+    }
+    if !result.unseen.is_empty() {
+        let _ = writeln!(text, "\nThe recordings say nothing on {}.", result.unseen.join(", "));
+    }
+    text
+}
+
+fn row(parameter: &FittedParameter) -> String {
+    let path = format!("{}.{}", parameter.section, parameter.name);
+    let spread = match (parameter.at_bound, parameter.std) {
+        (true, _) => "at bound".to_owned(),
+        (false, Some(std)) => format!("± {std:.2e}"),
+        (false, None) => "unknown".to_owned(),
+    };
+    format!("{path:<32}{:>12}  {:>12}   {spread:<14}{}", parameter.nominal, parameter.fitted, parameter.unit)
 }

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::outcome::Failure;
+use super::outcome_of;
+use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::recording::{Format, Recording};
 use crate::rig::Rig;
@@ -32,6 +33,16 @@ pub struct ReplayTask {
 }
 
 impl ReplayArguments {
+    /// Replays the recording and writes the prediction.
+    ///
+    /// # Errors
+    /// See [`ReplayArguments::prepare`] and [`crate::replay::predict`].
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let task = self.prepare()?;
+        crate::replay::predict(&task.rig, &task.recording)?.save(&task.out)?;
+        Ok(outcome_of([&task.recording]))
+    }
+
     /// Checks the output and reads the inputs.
     ///
     /// # Errors

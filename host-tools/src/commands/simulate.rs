@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use bowden_model::channel::Channel;
 
-use crate::outcome::Failure;
+use super::outcome_of;
+use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::recording::{Format, ReadOptions, Recording};
 use crate::rig::Rig;
+use crate::simulate::{Motion, Reference, RunOptions, run};
 
 /// Arguments of `bowden simulate`.
 #[derive(Clone, Debug, clap::Args)]
-#[command(group = clap::ArgGroup::new("course").required(true).args(["motion", "reference"]))]
 pub struct SimulateArguments {
     /// Rig file
     #[arg(long, value_name = "RIG.toml")]
@@ -20,8 +21,8 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "REC.csv")]
     out: PathBuf,
     /// Built-in motion of the reference
-    #[arg(long, value_name = "NAME")]
-    motion: Option<String>,
+    #[arg(long, value_name = "NAME", default_value = "lab", conflicts_with = "reference")]
+    motion: Motion,
     /// Recording whose `theta_ref_rad` is the reference
     #[arg(long, value_name = "FILE.csv")]
     reference: Option<PathBuf>,
@@ -31,7 +32,7 @@ pub struct SimulateArguments {
     /// Samples a second
     #[arg(long, default_value = "1000", value_parser = rate_hz)]
     rate_hz: f64,
-    /// Seed of the sensors' noise
+    /// Seed of the built-in motion and of the sensors' noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }
@@ -42,8 +43,8 @@ const DEFAULT_SECONDS: f64 = 40.0;
 /// What the position loop is to follow.
 #[derive(Clone, Debug)]
 pub enum Course {
-    /// A built-in motion by its name.
-    Motion(String),
+    /// A built-in motion.
+    Motion(Motion),
     /// A recorded `theta_ref_rad`.
     Reference(Recording),
 }
@@ -66,6 +67,23 @@ pub struct SimulateTask {
 }
 
 impl SimulateArguments {
+    /// Simulates and writes the recording.
+    ///
+    /// # Errors
+    /// See [`SimulateArguments::prepare`] and [`run`].
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let task = self.prepare()?;
+        let (reference, outcome) = match &task.course {
+            Course::Motion(motion) => {
+                (Reference::of_motion(*motion, task.seconds, task.seed), Outcome::done())
+            }
+            Course::Reference(recording) => (Reference::of_recording(recording)?, outcome_of([recording])),
+        };
+        let options = RunOptions { seconds: task.seconds, rate_hz: task.rate_hz, seed: task.seed };
+        run(&task.rig, &reference, options)?.save(&task.out)?;
+        Ok(outcome)
+    }
+
     /// Checks the output and reads the inputs.
     ///
     /// # Errors
@@ -82,19 +100,14 @@ impl SimulateArguments {
                 "{rig}:1:1: no [motor], which a forward run needs; add it or use replay"
             )));
         }
-        let course = match (&self.motion, &self.reference) {
-            (_, Some(path)) => {
+        let course = match &self.reference {
+            Some(path) => {
                 let only = Some(vec![Channel::ThetaRef]);
-                let reference = Recording::load(path, &ReadOptions { columns: rig.columns.clone(), only })?;
-                if reference.channel(Channel::ThetaRef).is_none() {
-                    return Err(Failure::bad_input(format!(
-                        "{}:1: no column `theta_ref_rad`; name the reference so",
-                        reference.source()
-                    )));
-                }
-                Course::Reference(reference)
+                let recording = Recording::load(path, &ReadOptions { columns: rig.columns.clone(), only })?;
+                Reference::of_recording(&recording)?;
+                Course::Reference(recording)
             }
-            (motion, None) => Course::Motion(motion.clone().unwrap_or_default()),
+            None => Course::Motion(self.motion),
         };
         let seconds = match (&course, self.seconds) {
             (_, Some(seconds)) => seconds,

@@ -64,11 +64,24 @@ impl Free {
         Some(Self { place: Place::Effect { effect, parameter }, spec, start, size, prior_std: f64::INFINITY })
     }
 
-    /// All parameters of one effect of `model`.
+    /// The same parameter, measured as a ratio to its start, which must be positive.
+    #[must_use]
+    pub fn as_ratio(mut self) -> Self {
+        if self.start > 0.0 {
+            self.spec.scale = Scale::Log;
+            self.size = 1.0;
+        }
+        self
+    }
+
+    /// The parameters of one effect of `model` that a search for missing physics fits.
     #[must_use]
     pub fn of_effect(model: &JointModel, effect: usize) -> Vec<Self> {
         let count = model.effects.get(effect).map_or(0, |active| active.descriptor().parameters.len());
-        (0..count).filter_map(|parameter| Self::effect(model, effect, parameter)).collect()
+        (0..count)
+            .filter_map(|parameter| Self::effect(model, effect, parameter))
+            .filter(|free| free.spec.searched)
+            .collect()
     }
 
     /// Where it stands.
@@ -151,19 +164,27 @@ impl Free {
 ///
 /// `μ` stands for `μ K`, `EA` for `EA / L`, the weight for `m l`; inertia of the rotor and gear ratio are counted and
 /// weighed when a bench is built.
-pub const RECALIBRATED: [(&str, &str); 8] = [
+pub const RECALIBRATED: [(&str, &str); 6] = [
     ("sheath", "friction_coefficient"),
     ("tendon", "axial_stiffness_n"),
     ("tendon", "pretension_n"),
     ("motor", "resistance_ohm"),
     ("motor", "torque_constant_nm_per_a"),
-    ("motor", "viscous_nm_s_per_rad"),
     ("load", "mass_kg"),
-    ("load", "viscous_nm_s_per_rad"),
 ];
+
+/// Viscous friction, which a plain fit recalibrates too. A diagnosis does not: viscous friction beyond the stated one is
+/// an effect that it can name.
+pub const VISCOUS: [(&str, &str); 2] = [("motor", "viscous_nm_s_per_rad"), ("load", "viscous_nm_s_per_rad")];
 
 /// The parameters of [`RECALIBRATED`] that `model` has.
 #[must_use]
 pub fn recalibrated(model: &JointModel) -> Vec<Free> {
     RECALIBRATED.iter().filter_map(|(section, name)| Free::nominal(model, section, name)).collect()
+}
+
+/// The parameters of [`RECALIBRATED`] and [`VISCOUS`] that `model` has.
+#[must_use]
+pub fn recalibrated_with_viscous(model: &JointModel) -> Vec<Free> {
+    RECALIBRATED.iter().chain(&VISCOUS).filter_map(|(section, name)| Free::nominal(model, section, name)).collect()
 }

@@ -1,9 +1,14 @@
 //! What a fit makes small: differences between recordings and replays, each in units of what it may be.
 //!
-//! Every output channel is compared in blocks of about ten milliseconds; a block's mean difference is divided by the
-//! channel's scale: sensor noise, a twelfth of a count squared, and 1.5 % of the channel's spread, which no model of a
-//! real bench undercuts. The torque that had to guide the motor counts as one more channel whose measured value is zero.
-//! A residual beyond three scales enters with its root only (soft L1), so that a few violent milliseconds do not decide.
+//! Every output channel is compared in two ways, because stick-slip and impacts are chaotic: their strength can be
+//! predicted, their phase cannot. *Means*: the difference of the means over blocks of 50 ms, one period of the arm on its
+//! tendons. *Flutter*: over half a second, the root mean square of what the block means leave, measured against simulated,
+//! where the simulated one has the sensor's noise added.
+//!
+//! Both are divided by the channel's scale: sensor noise, a twelfth of a count squared, and 1.5 % of the channel's spread,
+//! which no model of a real bench undercuts. The torque that had to guide the motor counts as one more channel whose
+//! measured value is zero. A residual beyond three scales enters with its root only (soft L1), so that a few violent
+//! moments do not decide.
 
 use bowden_model::channel::Channel;
 
@@ -13,8 +18,11 @@ use crate::reconstruct::quantum_of;
 use crate::recording::Recording;
 use crate::simulation::{Prediction, ReplayInput, replay};
 
-/// Length of a block, s.
-const BLOCK_S: f64 = 0.01;
+/// Length of a block of means, s.
+const BLOCK_S: f64 = 0.05;
+
+/// Length of a block of flutter, s.
+const FLUTTER_S: f64 = 0.5;
 
 /// Share of a channel's standard deviation that counts as agreement.
 const MODEL_FLOOR: f64 = 0.015;
@@ -29,7 +37,7 @@ const LOSS_BEND: f64 = 3.0;
 const LEAD_IN_S: f64 = 0.3;
 
 /// Length of the stretches that are held out in turn, s.
-const STRETCH_S: f64 = 2.5;
+const STRETCH_S: f64 = 1.0;
 
 /// What the residual of one series measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -65,6 +73,30 @@ struct Dataset {
     input: ReplayInput,
     measured: Vec<(Series, Vec<f64>)>,
     blocks: Vec<Block>,
+    /// Groups of consecutive blocks, as ranges into `blocks`.
+    flutter: Vec<std::ops::Range<usize>>,
+}
+
+/// What one residual compares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aspect {
+    /// Means over a block.
+    Mean,
+    /// Root mean square of what the means of several blocks leave.
+    Flutter,
+}
+
+/// Where one residual comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// Series that is compared.
+    pub series: Series,
+    /// Number of the recording.
+    pub recording: usize,
+    /// Samples and use.
+    pub block: Block,
+    /// What is compared.
+    pub aspect: Aspect,
 }
 
 /// Samples that are compared as one.
@@ -83,13 +115,14 @@ pub struct Block {
 pub struct Objective {
     datasets: Vec<Dataset>,
     scales: Vec<(Series, f64)>,
+    noise_variances: Vec<(Series, f64)>,
     free_offsets: Vec<Channel>,
 }
 
 /// Residuals of every series and block, in scales.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residuals {
-    /// Series, dataset by dataset, block by block.
+    /// In the order of [`Objective::entries`].
     pub values: Vec<f64>,
 }
 
@@ -123,8 +156,22 @@ impl Objective {
                 names.join(", ")
             )));
         }
-        let scales = series.iter().map(|s| (*s, scale_of(model, *s, &datasets))).collect();
-        Ok(Self { datasets, scales, free_offsets: model.free_offsets.clone() })
+        let noise_variances: Vec<_> = series.iter().map(|s| (*s, noise_variance(model, *s, &datasets))).collect();
+        let scales = noise_variances
+            .iter()
+            .map(|(series, noise)| (*series, scale_of(model, *series, *noise, &datasets)))
+            .collect();
+        Ok(Self { datasets, scales, noise_variances, free_offsets: model.free_offsets.clone() })
+    }
+
+    /// The same recordings with every sample used for fitting.
+    #[must_use]
+    pub fn all_training(&self) -> Self {
+        let mut all = self.clone();
+        for block in all.datasets.iter_mut().flat_map(|dataset| &mut dataset.blocks) {
+            block.part = Part::Training;
+        }
+        all
     }
 
     /// All series with their scales, in the unit of the series.
@@ -163,13 +210,18 @@ impl Objective {
         self.datasets.iter().map(|d| d.input.t_s().last().unwrap_or(&0.0) - d.input.t_s()[0]).fold(0.0, f64::max)
     }
 
-    /// Series, recording and block of every entry of [`Residuals::values`].
-    pub fn entries(&self) -> impl Iterator<Item = (Series, usize, Block)> + '_ {
-        self.datasets.iter().enumerate().flat_map(|(d, dataset)| {
-            dataset
-                .measured
-                .iter()
-                .flat_map(move |(series, _)| dataset.blocks.iter().map(move |block| (*series, d, *block)))
+    /// Origin of every entry of [`Residuals::values`].
+    pub fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
+        self.datasets.iter().enumerate().flat_map(|(recording, dataset)| {
+            dataset.measured.iter().flat_map(move |(series, _)| {
+                let entry = move |block, aspect| Entry { series: *series, recording, block, aspect };
+                let means = dataset.blocks.iter().map(move |block| entry(*block, Aspect::Mean));
+                let flutter = dataset.flutter.iter().map(move |group| {
+                    let (first, last) = (dataset.blocks[group.start], dataset.blocks[group.end - 1]);
+                    entry(Block { start: first.start, end: last.end, part: first.part }, Aspect::Flutter)
+                });
+                means.chain(flutter)
+            })
         })
     }
 
@@ -201,13 +253,20 @@ impl Objective {
                     Series::Guide => &prediction.guide_nm,
                 };
                 let offset = self.offset(*series, dataset, measured, predicted);
+                let noise_variance = self.noise_variance(*series);
+                let mut scatter = Vec::with_capacity(dataset.blocks.len());
                 for block in &dataset.blocks {
-                    let sum: f64 = measured[block.start..block.end]
+                    let [real, simulated] = [measured.as_slice(), predicted].map(|v| moments(&v[block.start..block.end]));
+                    values.push((real.mean - simulated.mean - offset) / scale);
+                    scatter.push([real.variance, simulated.variance + noise_variance]);
+                }
+                for group in &dataset.flutter {
+                    let blocks = (group.end - group.start) as f64;
+                    let [real, simulated] = scatter[group.clone()]
                         .iter()
-                        .zip(&predicted[block.start..block.end])
-                        .map(|(m, p)| m - p)
-                        .sum();
-                    values.push((sum / (block.end - block.start) as f64 - offset) / scale);
+                        .fold([0.0; 2], |sum, pair| [sum[0] + pair[0] / blocks, sum[1] + pair[1] / blocks])
+                        .map(f64::sqrt);
+                    values.push((real - simulated) / scale);
                 }
             }
         }
@@ -237,12 +296,18 @@ impl Objective {
         self.scales.iter().find(|(s, _)| *s == series).map_or(1.0, |(_, scale)| *scale)
     }
 
+    /// Variance that the sensor of a series adds, in its unit squared.
+    #[must_use]
+    pub fn noise_variance(&self, series: Series) -> f64 {
+        self.noise_variances.iter().find(|(s, _)| *s == series).map_or(0.0, |(_, variance)| *variance)
+    }
+
     /// Mean loss over a part of the data; 1 where every residual is one scale.
     #[must_use]
     pub fn mean_loss(&self, residuals: &Residuals, part: Part) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for ((_, _, block), value) in self.entries().zip(&residuals.values) {
-            if block.part == part {
+        for (entry, value) in self.entries().zip(&residuals.values) {
+            if entry.block.part == part {
                 sum += loss(*value);
                 count += 1.0;
             }
@@ -298,7 +363,19 @@ impl Dataset {
             blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });
             start = end;
         }
-        Ok(Self { input, measured, blocks })
+        let mut flutter: Vec<std::ops::Range<usize>> = Vec::new();
+        for (index, block) in blocks.iter().enumerate() {
+            match flutter.last_mut() {
+                Some(group)
+                    if blocks[group.start].part == block.part
+                        && t_s[block.end - 1] - t_s[blocks[group.start].start] < FLUTTER_S =>
+                {
+                    group.end = index + 1;
+                }
+                _ => flutter.push(index..index + 1),
+            }
+        }
+        Ok(Self { input, measured, blocks, flutter })
     }
 }
 
@@ -315,31 +392,53 @@ pub fn soft(residual: f64) -> f64 {
     LOSS_BEND * (2.0 * ((1.0 + z * z).sqrt() - 1.0)).sqrt().copysign(residual)
 }
 
-fn scale_of(model: &JointModel, series: Series, datasets: &[Dataset]) -> f64 {
-    let all = || datasets.iter().flat_map(|d| d.measured.iter().filter(|(s, _)| *s == series).map(|(_, v)| v));
-    let spread = |values: &Vec<f64>| {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
-    };
-    let variance = all().map(spread).fold(0.0, f64::max);
+struct Moments {
+    mean: f64,
+    variance: f64,
+}
+
+fn moments(values: &[f64]) -> Moments {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    Moments { mean, variance }
+}
+
+fn recorded(datasets: &[Dataset], series: Series) -> impl Iterator<Item = &[f64]> {
+    datasets.iter().flat_map(move |d| d.measured.iter().filter(move |(s, _)| *s == series).map(|(_, v)| v.as_slice()))
+}
+
+/// White noise of the sensor, and a twelfth of its step squared.
+fn noise_variance(model: &JointModel, series: Series, datasets: &[Dataset]) -> f64 {
+    let Series::Channel(channel) = series else { return 0.0 };
     let sensors = &model.parameters.sensors;
+    let noise = match channel {
+        Channel::F1 | Channel::F2 | Channel::F3 | Channel::F4 => sensors.tension_noise_n,
+        Channel::MotorCurrent => sensors.current_noise_a,
+        _ => 0.0,
+    };
+    let quantum = recorded(datasets, series).filter_map(quantum_of).fold(0.0, f64::max);
+    noise * noise + quantum * quantum / 12.0
+}
+
+fn scale_of(model: &JointModel, series: Series, noise_variance: f64, datasets: &[Dataset]) -> f64 {
     match series {
         Series::Guide => {
-            // Of the torque of the motor at the current for which its supply is good: what a gear loses unnoticed.
-            let torque = model.parameters.motor.map_or(1.0, |m| {
-                m.torque_constant_nm_per_a * m.gear_ratio * m.supply_v / m.resistance_ohm
-            });
-            0.0015 * torque
+            // Of the stall torque of the motor: what a gear loses unnoticed.
+            const SHARE: f64 = 0.0015;
+            let stall_nm = model
+                .parameters
+                .motor
+                .map_or(1.0, |m| m.torque_constant_nm_per_a * m.gear_ratio * m.supply_v / m.resistance_ohm);
+            SHARE * stall_nm
         }
         Series::Channel(channel) => {
-            let quantum = all().filter_map(|v| quantum_of(v)).fold(0.0, f64::max);
-            let (noise, floor) = match channel {
-                Channel::F1 | Channel::F2 | Channel::F3 | Channel::F4 => (sensors.tension_noise_n, MODEL_FLOOR),
-                Channel::MotorCurrent => (sensors.current_noise_a, MODEL_FLOOR),
-                Channel::ThetaIn | Channel::ThetaOut | Channel::ThetaMotor => (0.0, ANGLE_FLOOR),
-                _ => (0.0, MODEL_FLOOR),
+            let floor = match channel {
+                Channel::ThetaIn | Channel::ThetaOut | Channel::ThetaMotor => ANGLE_FLOOR,
+                _ => MODEL_FLOOR,
             };
-            (noise * noise + quantum * quantum / 12.0 + floor * floor * variance).sqrt().max(f64::MIN_POSITIVE)
+            let spread = recorded(datasets, series).map(|v| moments(v).variance).fold(0.0, f64::max);
+            (noise_variance + floor * floor * spread).sqrt().max(f64::MIN_POSITIVE)
         }
     }
 }

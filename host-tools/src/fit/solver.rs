@@ -10,10 +10,12 @@ use super::objective::{Objective, Part, Residuals, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 
-/// Steps of the difference quotients in the optimiser's coordinate, one round of the optimiser each. Stick, slip and
-/// impacts make the residuals rough: a coarse step sees the slope through the roughness, a fine one then finds the
-/// place.
-const DIFFERENCE_STEPS: [f64; 2] = [0.1, 0.02];
+/// Step of the difference quotients in the optimiser's coordinate that sees the slope through the roughness that stick,
+/// slip and impacts leave in the residuals.
+pub const COARSE_STEP: f64 = 0.1;
+
+/// Step that then finds the place.
+pub const FINE_STEP: f64 = 0.02;
 
 /// Result of a fit.
 #[derive(Clone, Debug)]
@@ -61,20 +63,20 @@ impl Problem<'_> {
     }
 }
 
-/// Training residuals after the soft loss. Neighbouring blocks tell nearly the same: their weight is that of one block
-/// in ten, which keeps priors and standard deviations honest.
-fn training_rows(objective: &Objective, residuals: &Residuals) -> Vec<f64> {
+/// Training residuals after the soft loss, weighted as in a fit. Neighbouring blocks tell nearly the same: their weight is that of one block
+/// in two, which keeps priors and standard deviations honest.
+pub(crate) fn training_rows(objective: &Objective, residuals: &Residuals) -> Vec<f64> {
     let weight = CORRELATED_BLOCKS.sqrt().recip();
     objective
         .entries()
         .zip(&residuals.values)
-        .filter(|((_, _, block), _)| block.part == Part::Training)
+        .filter(|(entry, _)| entry.block.part == Part::Training)
         .map(|(_, value)| weight * soft(*value))
         .collect()
 }
 
 /// Blocks over which the residuals of a real bench stay alike, 0.1 s: the time in which a front crosses a sheath.
-const CORRELATED_BLOCKS: f64 = 10.0;
+const CORRELATED_BLOCKS: f64 = 2.0;
 
 impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     type ResidualStorage = Owned<f64, Dyn>;
@@ -123,6 +125,20 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 /// # Errors
 /// When the model cannot be driven.
 pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience: usize) -> Result<Solution, Failure> {
+    solve_in_rounds(objective, model, free, patience, &[COARSE_STEP, FINE_STEP, FINE_STEP])
+}
+
+/// Like [`solve`] with the given steps of the difference quotients, one round each.
+///
+/// # Errors
+/// When the model cannot be driven.
+pub fn solve_in_rounds(
+    objective: &Objective,
+    model: &JointModel,
+    free: &[Free],
+    patience: usize,
+    rounds: &[f64],
+) -> Result<Solution, Failure> {
     // Checks once that the model can be simulated at all; inside the optimiser an error could not be told.
     let start = objective.residuals(model)?;
     if free.is_empty() {
@@ -136,8 +152,7 @@ pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience:
     }
     let mut fixed = vec![false; free.len()];
     let mut x = DVector::zeros(free.len());
-    let [coarse, fine] = DIFFERENCE_STEPS;
-    for step in [coarse, fine, fine] {
+    for (round, &step) in rounds.iter().enumerate() {
         let mut problem = Problem { objective, model, free, fixed: &fixed, step, x: x.clone(), current: None };
         problem.set_params(&x);
         let optimiser = LevenbergMarquardt::new()
@@ -155,11 +170,12 @@ pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience:
                 newly = true;
             }
         }
-        if (step == fine && !newly) || fixed.iter().all(|f| *f) {
+        let repeated = round > 0 && rounds[round - 1] == step;
+        if (repeated && !newly) || fixed.iter().all(|f| *f) {
             break;
         }
     }
-    let mut problem = Problem { objective, model, free, fixed: &fixed, step: fine, x: x.clone(), current: None };
+    let mut problem = Problem { objective, model, free, fixed: &fixed, step: FINE_STEP, x: x.clone(), current: None };
     problem.set_params(&x);
     let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
     let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();

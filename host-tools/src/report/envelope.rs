@@ -1,10 +1,12 @@
 //! Thins a series to what a plot of given width can show.
 
+use super::axis;
+
 /// Lowest and highest sample of each of `columns` equal spans of time, in order of time.
 ///
 /// A column gives at most two points, so a line through them covers the same pixels, to one column's width, as a line
 /// through all samples, and a spike of one sample keeps its full height. `t_s` increases; samples outside
-/// `t_start_s..=t_end_s` or not finite are left out.
+/// `t_start_s..=t_end_s` or not drawable are left out.
 pub(super) fn envelope(
     t_s: &[f64],
     values: &[f64],
@@ -15,7 +17,7 @@ pub(super) fn envelope(
     let mut points = Vec::with_capacity(2 * columns.min(t_s.len()));
     let mut open: Option<Column> = None;
     for (&t, &value) in t_s.iter().zip(values) {
-        if !value.is_finite() || !(t_start_s..=t_end_s).contains(&t) {
+        if !axis::is_drawable(value) || !(t_start_s..=t_end_s).contains(&t) {
             continue;
         }
         let index = if span_s > 0.0 {
@@ -60,8 +62,11 @@ impl Column {
     }
 
     fn emit(self, points: &mut Vec<(f64, f64)>) {
-        let (first, second) =
-            if self.lowest.0 <= self.highest.0 { (self.lowest, self.highest) } else { (self.highest, self.lowest) };
+        let (first, second) = if self.lowest.0 <= self.highest.0 {
+            (self.lowest, self.highest)
+        } else {
+            (self.highest, self.lowest)
+        };
         points.push(first);
         if second != first {
             points.push(second);
@@ -100,7 +105,8 @@ mod tests {
     fn extremes_of_every_column_are_those_of_a_search() {
         // Uneven sampling with a hole, so that columns hold many samples, few, or none.
         let values = noise(3000);
-        let t_s: Vec<f64> = (0..3000).map(|i| f64::from(i * i) * 1e-6 + if i > 1500 { 4.0 } else { 0.0 }).collect();
+        let t_s: Vec<f64> =
+            (0..3000).map(|i| f64::from(i * i) * 1e-6 + if i > 1500 { 4.0 } else { 0.0 }).collect();
         let end_s = t_s[2999];
         let columns = 64;
         let points = envelope(&t_s, &values, (0.0, end_s), columns);
@@ -112,10 +118,14 @@ mod tests {
                 let (from, to) = (column as f64 * width_s, (column + 1) as f64 * width_s);
                 t >= from && (t < to || column + 1 == columns)
             };
-            let all: Vec<f64> = t_s.iter().zip(&values).filter(|(t, _)| inside(**t)).map(|(_, v)| *v).collect();
+            let all: Vec<f64> =
+                t_s.iter().zip(&values).filter(|(t, _)| inside(**t)).map(|(_, v)| *v).collect();
             let kept: Vec<f64> = points.iter().filter(|(t, _)| inside(*t)).map(|(_, v)| *v).collect();
             let extremes = |of: &[f64]| {
-                (of.iter().copied().fold(f64::INFINITY, f64::min), of.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+                (
+                    of.iter().copied().fold(f64::INFINITY, f64::min),
+                    of.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+                )
             };
             assert_eq!(extremes(&kept), extremes(&all), "column {column}");
             assert!(kept.len() <= 2, "column {column} has {} points", kept.len());

@@ -59,7 +59,8 @@ pub(super) fn share(value: f64) -> String {
         format!(">{THIN}99.9{THIN}%")
     } else {
         // One decimal near either end, where it tells: 0.4 %, 99.5 %.
-        let decimals = usize::from((percent.abs() < 10.0 || percent > 98.95) && percent != 0.0 && percent != 100.0);
+        let decimals =
+            usize::from((percent.abs() < 10.0 || percent > 98.95) && percent != 0.0 && percent != 100.0);
         format!("{}{THIN}%", fixed(percent, decimals))
     }
 }
@@ -94,6 +95,24 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
     let is_zero = text.bytes().all(|b| matches!(b, b'0' | b'.'));
     format!("{}{grouped}{rest}", if value < 0.0 && !is_zero { "−" } else { "" })
+}
+
+/// Exponent of ten to take out of numbers up to `largest` that stand together: 0 where they read well as they are.
+pub(super) fn shared_exponent(largest: f64) -> i32 {
+    if largest == 0.0 || !largest.is_finite() || (0.02..1e5).contains(&largest) {
+        return 0;
+    }
+    3 * (largest.log10() / 3.0).floor() as i32
+}
+
+/// Unit with the power of ten that was taken out of the numbers, such as `10⁻³ N·m`; empty for a plain ratio.
+pub(super) fn scaled_unit(exponent: i32, unit: &str) -> String {
+    let unit = unit_text(unit);
+    match exponent {
+        0 => unit,
+        _ if unit.is_empty() => power_of_ten(exponent),
+        _ => format!("{}{THIN}{unit}", power_of_ten(exponent)),
+    }
 }
 
 /// `10ⁿ`.
@@ -145,15 +164,28 @@ mod tests {
     use super::*;
 
     /// Narrow spaces written as plain ones, for reading.
-    fn plain(text: String) -> String {
+    fn plain(text: &str) -> String {
         text.replace(THIN, " ")
     }
 
     #[test]
     fn numbers_have_three_digits() {
-        let shown = [0.0, 1.0, -12.345, 0.09996, 9.999, 123.4, 25_000.0, 0.001_234, 4.56e-5, -7.891e7, f64::NAN]
-            .map(|value| plain(number(value)));
-        let by_hand = ["0", "1.00", "−12.3", "0.100", "10.0", "123", "25 000", "0.00123", "4.56 × 10⁻⁵", "−7.89 × 10⁷", "–"];
+        let shown =
+            [0.0, 1.0, -12.345, 0.09996, 9.999, 123.4, 25_000.0, 0.001_234, 4.56e-5, -7.891e7, f64::NAN]
+                .map(|value| plain(&number(value)));
+        let by_hand = [
+            "0",
+            "1.00",
+            "−12.3",
+            "0.100",
+            "10.0",
+            "123",
+            "25 000",
+            "0.00123",
+            "4.56 × 10⁻⁵",
+            "−7.89 × 10⁷",
+            "–",
+        ];
         assert_eq!(shown, by_hand);
     }
 
@@ -170,23 +202,31 @@ mod tests {
             (2.0, Some(f64::NAN), "s", "2.00 s"),
         ];
         for (value, std, unit, expected) in cases {
-            assert_eq!(plain(estimate(value, std, unit)), expected);
+            assert_eq!(plain(&estimate(value, std, unit)), expected);
         }
     }
 
     #[test]
     fn shares_are_never_rounded_to_all_or_nothing() {
-        let shown = [0.0, 0.000_4, 0.042, 0.5, 0.986, 0.994, 0.999_7, 1.0].map(|value| plain(share(value)));
+        let shown = [0.0, 0.000_4, 0.042, 0.5, 0.986, 0.994, 0.999_7, 1.0].map(|value| plain(&share(value)));
         assert_eq!(shown, ["0 %", "< 0.1 %", "4.2 %", "50 %", "99 %", "99.4 %", "> 99.9 %", "100 %"]);
     }
 
     #[test]
     fn changes_carry_a_sign() {
-        assert_eq!(plain(change(0.2, 0.25)), "+25.0 %");
-        assert_eq!(plain(change(-2.0, -3.0)), "−50.0 %");
-        assert_eq!(plain(change(1.0, 4.0)), "+300 %");
-        assert_eq!(plain(change(1.0, 1.0)), "0.0 %");
+        assert_eq!(plain(&change(0.2, 0.25)), "+25.0 %");
+        assert_eq!(plain(&change(-2.0, -3.0)), "−50.0 %");
+        assert_eq!(plain(&change(1.0, 4.0)), "+300 %");
+        assert_eq!(plain(&change(1.0, 1.0)), "0.0 %");
         assert_eq!(change(0.0, 1.0), "–");
+    }
+
+    #[test]
+    fn numbers_that_stand_together_share_a_power_of_ten() {
+        assert_eq!([0.0, 0.02, 99_999.0, f64::NAN].map(shared_exponent), [0; 4]);
+        assert_eq!([0.019, 0.001, 0.000_9, 1e5, 2.5e6].map(shared_exponent), [-3, -3, -6, 3, 6]);
+        assert_eq!(plain(&scaled_unit(-3, "N m")), "10⁻³ N·m");
+        assert_eq!((scaled_unit(0, "rad").as_str(), scaled_unit(6, "1").as_str()), ("rad", "10⁶"));
     }
 
     #[test]

@@ -4,9 +4,14 @@ use bowden_model::channel::Channel;
 
 use crate::diagnose::verdict::{Findings, Verdict};
 
-/// Identifier as words: `gear_load_friction` becomes `Gear load friction`.
+/// Identifier as words: `gear_load_friction` becomes `gear load friction`.
+pub(super) fn phrase(id: &str) -> String {
+    id.replace('_', " ").replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+}
+
+/// Identifier as words that begin a line: `gear_load_friction` becomes `Gear load friction`.
 pub(super) fn words(id: &str) -> String {
-    let spaced = id.replace('_', " ");
+    let spaced = phrase(id);
     let mut characters = spaced.chars();
     characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
@@ -51,11 +56,16 @@ pub(super) fn verdict(findings: &Findings) -> String {
     match diagnosis.verdict {
         Verdict::Consistent => "Consistent: nothing worth adding or changing".into(),
         Verdict::Recalibrate => "Recalibrate: parameters were off, no physics is missing".into(),
-        Verdict::Unexplained => "Unexplained: structure is left that no effect of the catalogue explains".into(),
+        Verdict::Unexplained => {
+            "Unexplained: structure is left that no effect of the catalogue explains".into()
+        }
         Verdict::MissingPhysics => {
-            let named: Vec<String> =
-                diagnosis.effects.iter().map(|effect| effect.id.replace('_', " ")).collect();
-            if named.is_empty() { "Missing physics".into() } else { format!("Missing physics: {}", named.join(", ")) }
+            let named: Vec<String> = diagnosis.effects.iter().map(|effect| phrase(&effect.id)).collect();
+            if named.is_empty() {
+                "Missing physics".into()
+            } else {
+                format!("Missing physics: {}", named.join(", "))
+            }
         }
     }
 }

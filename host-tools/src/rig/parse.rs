@@ -46,6 +46,8 @@ const GAIN_DUTY_PER_RAD: Bounds = Bounds { lower: 1e-6, upper: 1e6, unit: "1/rad
 const DUTY_LIMIT: Bounds = Bounds { lower: 1e-3, upper: 1.0, unit: "1" };
 const DELAY_S: Bounds = Bounds { lower: 0.0, upper: 1.0, unit: "s" };
 
+const SMOOTHING_S: Bounds = Bounds { lower: 0.0, upper: 1.0, unit: "s" };
+
 /// Any finite number.
 const FINITE: Bounds = Bounds { lower: f64::MIN, upper: f64::MAX, unit: "1" };
 
@@ -83,9 +85,9 @@ pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
     if joint.tendon.is_none() && joint.motor.is_none() {
         return lacks_part("neither [motor] nor [tendon] is there; add the part that was recorded");
     }
-    let (replay_inputs, replay_outputs) = match section("replay")? {
+    let replay = match section("replay")? {
         Some(replay) => read_replay(&replay, file.get("controller").is_some())?,
-        None => (None, None),
+        None => Replay::default(),
     };
     Ok(Rig {
         name: file.string("name")?.map_or_else(|| "unnamed".to_owned(), |(name, _)| name.to_owned()),
@@ -98,8 +100,11 @@ pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
             Some(recording) => read_columns(&recording)?,
             None => ColumnMap::default(),
         },
-        replay_inputs,
-        replay_outputs,
+        replay_inputs: replay.inputs,
+        replay_outputs: replay.outputs,
+        free_offsets: replay.free_offsets,
+        relative_inputs: replay.relative_inputs,
+        smoothing_s: replay.smoothing_s,
     })
 }
 
@@ -308,8 +313,18 @@ fn read_column(section: &Section) -> Result<ColumnSource, Failure> {
 
 type Channels = Option<Vec<Channel>>;
 
-fn read_replay(section: &Section, has_controller: bool) -> Result<(Channels, Channels), Failure> {
-    section.refuse_unknown("key", ["inputs", "outputs"])?;
+/// What `[replay]` says.
+#[derive(Default)]
+struct Replay {
+    inputs: Channels,
+    outputs: Channels,
+    free_offsets: Vec<Channel>,
+    relative_inputs: Vec<Channel>,
+    smoothing_s: Vec<(Channel, f64)>,
+}
+
+fn read_replay(section: &Section, has_controller: bool) -> Result<Replay, Failure> {
+    section.refuse_unknown("key", ["inputs", "outputs", "free_offsets", "relative_inputs", "smoothing_s"])?;
     let inputs = read_channels(section, "inputs", |channel| match channel {
         Channel::ThetaRef if !has_controller => {
             Some("needs the law of the position loop; add [controller] or take duty as input".to_owned())
@@ -321,7 +336,42 @@ fn read_replay(section: &Section, has_controller: bool) -> Result<(Channels, Cha
         Some(inputs) if inputs.contains(&channel) => Some("is an input too; keep one of the two".to_owned()),
         _ => None,
     })?;
-    Ok((inputs, outputs))
+    let drives = |channel: &Channel| match &inputs {
+        Some(inputs) => inputs.contains(channel),
+        None => can_drive(*channel),
+    };
+    let no_input = || Some("is no input of the replay; name it in replay.inputs or drop it here".to_owned());
+    let free_offsets = read_channels(section, "free_offsets", |channel| match (&outputs, &inputs) {
+        (Some(outputs), _) if !outputs.contains(&channel) => {
+            Some("is no output of the replay; name it in replay.outputs or drop it here".to_owned())
+        }
+        (None, Some(inputs)) if inputs.contains(&channel) => {
+            Some("is an input; an arbitrary zero of an input belongs in replay.relative_inputs".to_owned())
+        }
+        _ => None,
+    })?;
+    let relative_inputs =
+        read_channels(section, "relative_inputs", |channel| if drives(&channel) { None } else { no_input() })?;
+    let mut smoothing_s = Vec::new();
+    if let Some(table) = section.section("smoothing_s", "replay.smoothing_s")? {
+        table.refuse_unknown("role", Channel::ALL.into_iter().map(Channel::role))?;
+        for (role, span, _) in table.entries() {
+            let Some(channel) = Channel::from_role(role) else { continue };
+            if let (false, Some(reason)) = (drives(&channel), no_input()) {
+                return Err(table.source.at(&span, format!("`{role}` in {} {reason}", table.name)));
+            }
+            if let Some(time_s) = table.number(role, SMOOTHING_S)? {
+                smoothing_s.push((channel, time_s));
+            }
+        }
+    }
+    Ok(Replay {
+        inputs,
+        outputs,
+        free_offsets: free_offsets.unwrap_or_default(),
+        relative_inputs: relative_inputs.unwrap_or_default(),
+        smoothing_s,
+    })
 }
 
 fn read_channels(

@@ -11,7 +11,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
     summary: "the weight at the arm changes at some moment",
     parameters: &[
         ParameterSpec::linear("change_kg", "kg", [-100.0, 100.0], 0.5, "change of mass"),
-        ParameterSpec::linear("time_s", "s", [0.0, 100000.0], 10.0, "when it happens"),
+        ParameterSpec::linear("time_s", "s", [0.0, 100_000.0], 10.0, "when it happens"),
     ],
     neutral: Some(0.0),
     channels: &[],

@@ -13,7 +13,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
     summary: "pretension drops at some moment",
     parameters: &[
         ParameterSpec::linear("share", "1", [0.0, 0.95], 0.2, "part of the pretension that is lost"),
-        ParameterSpec::linear("time_s", "s", [0.0, 100000.0], 10.0, "when it happens"),
+        ParameterSpec::linear("time_s", "s", [0.0, 100_000.0], 10.0, "when it happens"),
     ],
     neutral: Some(0.0),
     channels: &[],

@@ -3,7 +3,7 @@
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
 };
-use libm::{exp, pow};
+use libm::{exp, expm1, pow};
 
 /// Sheath friction that is higher at low speed: `μ(v) = μ (1 + (ρ - 1) e^{-|v/v_s|^δ})`.
 pub struct SheathStribeckFriction;
@@ -33,15 +33,22 @@ static DESCRIPTOR: Descriptor = Descriptor {
     channels: &[],
 };
 
+/// Time by which friction follows the speed: the frictional memory of lubricated metal, a few milliseconds (Hess and
+/// Soom, J. Tribol. 112 (1990) 147).
+const MEMORY_S: f64 = 0.005;
+
 impl Effect for SheathStribeckFriction {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
     }
 
-    fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
-        for tendon in &mut port.tendons {
-            for (law, speed) in tendon.slip.iter_mut().zip(tendon.speed_m_s) {
-                let excess = (p[0] - 1.0) * exp(-pow(speed.abs() / p[1], p[2]));
+    fn transmission(&self, p: &[f64; MAX_PARAMETERS], s: &mut EffectState, port: &mut TransmissionPort) {
+        let share = -expm1(-port.dt_s / MEMORY_S);
+        for (tendon, filtered) in port.tendons.iter_mut().zip(s.chunks_mut(2)) {
+            let speeds = tendon.slip_speeds_m_s();
+            for ((law, speed), filtered) in tendon.slip.iter_mut().zip(speeds).zip(filtered) {
+                *filtered += share * (speed - *filtered);
+                let excess = (p[0] - 1.0) * exp(-pow(*filtered / p[1], p[2]));
                 law.friction_coefficient *= 1.0 + excess;
             }
         }

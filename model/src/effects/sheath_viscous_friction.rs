@@ -30,8 +30,9 @@ impl Effect for SheathViscousFriction {
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for tendon in &mut port.tendons {
             let wrap_angle_rad = tendon.wrap_angle_rad.max(1e-3);
-            for (law, speed) in tendon.slip.iter_mut().zip(tendon.speed_m_s) {
-                law.friction_n_per_rad += p[0] * speed.abs() / wrap_angle_rad;
+            let speeds = tendon.slip_speeds_m_s();
+            for (law, speed) in tendon.slip.iter_mut().zip(speeds) {
+                law.friction_n_per_rad += p[0] * speed / wrap_angle_rad;
             }
         }
     }

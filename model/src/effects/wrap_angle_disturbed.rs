@@ -13,8 +13,8 @@ static DESCRIPTOR: Descriptor = Descriptor {
     summary: "the sheaths were moved from outside for a while",
     parameters: &[
         ParameterSpec::linear("change_rad", "rad", [-6.0, 12.0], 1.5, "change of wrap angle while disturbed"),
-        ParameterSpec::linear("start_s", "s", [0.0, 100000.0], 10.0, "when it begins"),
-        ParameterSpec::log("duration_s", "s", [0.2, 100000.0], 5.0, "how long it lasts"),
+        ParameterSpec::linear("start_s", "s", [0.0, 100_000.0], 10.0, "when it begins"),
+        ParameterSpec::log("duration_s", "s", [0.2, 100_000.0], 5.0, "how long it lasts"),
     ],
     neutral: Some(0.0),
     channels: &[],

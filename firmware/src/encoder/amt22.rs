@@ -1,0 +1,182 @@
+//! AMT22 of Same Sky (formerly CUI Devices), 12-bit type, SPI.
+//!
+//! A frame has 16 bits `K1 K0 P11 ... P0 0 0`: two check bits, the position and two bits that this type leaves zero
+//! (AMT22 data sheet, section on the serial interface). Each check bit makes the number of ones odd over every second
+//! bit, itself included: K1 over bits 15, 13, ... 1 and K0 over bits 14, 12, ... 0. One wrong bit is always found, and a
+//! line that is stuck at either level fails both checks.
+
+use core::fmt;
+
+use super::{AbsoluteEncoder, CountRaw, FrameBus, ReadError, ReadResult, Reading};
+
+/// Bits of a frame.
+pub const FRAME_BITS: u8 = 16;
+
+/// K1 and the bits that it checks; K0 and the bits that it checks.
+const CHECKED_BY_K1: u16 = 0xaaaa;
+const CHECKED_BY_K0: u16 = 0x5555;
+
+/// Bits below the position.
+const BELOW_POSITION: u32 = 2;
+
+/// What is wrong with a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A check bit does not match: the frame was disturbed, or no encoder drives the line.
+    Check {
+        /// The frame.
+        frame_raw: u16,
+        /// Whether K1 matches.
+        k1_holds: bool,
+        /// Whether K0 matches.
+        k0_holds: bool,
+    },
+    /// The bits below a 12-bit position are not zero: the encoder is of the 14-bit type.
+    Resolution {
+        /// The frame.
+        frame_raw: u16,
+    },
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Check { frame_raw, k1_holds: false, k0_holds: false } => {
+                write!(
+                    f,
+                    "AMT22 frame {frame_raw:#06x}: both check bits are wrong; look for a cut wire or no supply"
+                )
+            }
+            Self::Check { frame_raw, k1_holds, .. } => {
+                let bit = if *k1_holds { "K0" } else { "K1" };
+                write!(
+                    f,
+                    "AMT22 frame {frame_raw:#06x}: check bit {bit} is wrong; shield the line or slow the clock"
+                )
+            }
+            Self::Resolution { frame_raw } => {
+                write!(
+                    f,
+                    "AMT22 frame {frame_raw:#06x}: 14 bits of position, expected the 12-bit type; exchange it"
+                )
+            }
+        }
+    }
+}
+
+/// Position in a frame.
+///
+/// # Errors
+/// [`Fault`] when a check bit does not match or the frame is not one of the 12-bit type.
+pub const fn decode(frame_raw: u16) -> Result<CountRaw, Fault> {
+    let k1_holds = (frame_raw & CHECKED_BY_K1).count_ones() % 2 == 1;
+    let k0_holds = (frame_raw & CHECKED_BY_K0).count_ones() % 2 == 1;
+    if !(k1_holds && k0_holds) {
+        return Err(Fault::Check { frame_raw, k1_holds, k0_holds });
+    }
+    if frame_raw.trailing_zeros() < BELOW_POSITION {
+        return Err(Fault::Resolution { frame_raw });
+    }
+    Ok(CountRaw::from_low_bits((frame_raw >> BELOW_POSITION) as u32))
+}
+
+/// An AMT22 behind a bus.
+#[derive(Debug)]
+pub struct Amt22<B> {
+    bus: B,
+}
+
+impl<B> Amt22<B> {
+    /// The encoder that `bus` leads to.
+    pub const fn new(bus: B) -> Self {
+        Self { bus }
+    }
+}
+
+impl<B: FrameBus> AbsoluteEncoder for Amt22<B> {
+    /// This type tells nothing beside its position.
+    type Health = ();
+    type Fault = Fault;
+    type BusError = B::Error;
+
+    fn read(&mut self) -> ReadResult<Self> {
+        let frame_raw = self.bus.transfer(FRAME_BITS).map_err(ReadError::Bus)?;
+        let count_raw = decode((frame_raw & 0xffff) as u16).map_err(ReadError::Frame)?;
+        Ok(Reading { count_raw, health: () })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frame of a 14-bit field, bit by bit as the equations of the data sheet go:
+    /// `K1 = !(H5^H3^H1^L7^L5^L3^L1)`, `K0 = !(H4^H2^H0^L6^L4^L2^L0)`.
+    fn frame(field: u16) -> u16 {
+        let bit = |n: u16| field >> n & 1 == 1;
+        let k1 = !(bit(13) ^ bit(11) ^ bit(9) ^ bit(7) ^ bit(5) ^ bit(3) ^ bit(1));
+        let k0 = !(bit(12) ^ bit(10) ^ bit(8) ^ bit(6) ^ bit(4) ^ bit(2) ^ bit(0));
+        u16::from(k1) << 15 | u16::from(k0) << 14 | field
+    }
+
+    #[test]
+    fn every_position_comes_back() {
+        for count in 0..4096 {
+            assert_eq!(decode(frame(count << 2)).map(CountRaw::get), Ok(count));
+        }
+    }
+
+    #[test]
+    fn a_frame_worked_by_hand() {
+        // 0xabc << 2 = 10 1010 1111 0000: ones at 13, 11, 9, 7, 5 (odd, so K1 = 0) and at 6, 4 (even, so K0 = 1).
+        assert_eq!(decode(0x6af0).map(CountRaw::get), Ok(0xabc));
+    }
+
+    #[test]
+    fn every_single_wrong_bit_is_found_and_named() {
+        for count in 0..4096 {
+            for bit in 0..16 {
+                let wrong = frame(count << 2) ^ 1 << bit;
+                let of_k1 = bit % 2 == 1;
+                let expected = Fault::Check { frame_raw: wrong, k1_holds: !of_k1, k0_holds: of_k1 };
+                assert_eq!(decode(wrong), Err(expected), "count {count}, bit {bit}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_stuck_line_fails_both_checks() {
+        for frame_raw in [0x0000, 0xffff] {
+            let expected = Fault::Check { frame_raw, k1_holds: false, k0_holds: false };
+            assert_eq!(decode(frame_raw), Err(expected));
+        }
+    }
+
+    #[test]
+    fn a_position_of_fourteen_bits_is_not_taken_for_one_of_twelve() {
+        // The example of the data sheet, 0x61ab, is a frame of the 14-bit type.
+        assert_eq!(decode(0x61ab), Err(Fault::Resolution { frame_raw: 0x61ab }));
+        let accepted = (0..1 << 14).filter(|field| decode(frame(*field)).is_ok()).count();
+        assert_eq!(accepted, 4096);
+    }
+
+    /// A bus with one answer, strict on the length of a frame.
+    struct One(Result<u32, &'static str>);
+
+    impl FrameBus for One {
+        type Error = &'static str;
+
+        fn transfer(&mut self, bits: u8) -> Result<u32, &'static str> {
+            assert_eq!(bits, 16, "an AMT22 frame has 16 clocks");
+            self.0
+        }
+    }
+
+    #[test]
+    fn errors_of_bus_and_frame_stay_apart() {
+        let read = |answer| Amt22::new(One(answer)).read().map(|reading| reading.count_raw.get());
+        assert_eq!(read(Ok(0x6af0)), Ok(0xabc));
+        assert_eq!(read(Err("timeout")), Err(ReadError::Bus("timeout")));
+        assert!(matches!(read(Ok(0x6af1)), Err(ReadError::Frame(Fault::Check { .. }))));
+    }
+}

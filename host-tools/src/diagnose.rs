@@ -1,0 +1,290 @@
+//! Finds which physics a simulation lacks, and proves it on data that the fit has not seen.
+//!
+//! 1. Parameters that are merely wrong are corrected first.
+//! 2. What is left is placed: channel, component, regime.
+//! 3. Every effect of the catalogue is tried: simulated at several starting points, ranked, the best refitted together
+//!    with all nominal parameters.
+//! 4. An effect is named only if it improves held-out data by more than the difference that any two realities have.
+//! 5. The named physics is fitted once more to all data and written as a rig file.
+
+mod candidates;
+mod place;
+mod screening;
+mod selection;
+mod unexplained;
+pub mod verdict;
+mod words;
+
+use std::collections::BTreeMap;
+
+use bowden_model::effect::ActiveEffect;
+
+use crate::fit::free::{Free, recalibrated};
+use crate::fit::objective::{Objective, Part, Series};
+use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
+use crate::progress::Progress;
+use crate::recording::Recording;
+use crate::rig::{Rig, RigDocument};
+use crate::simulation::Prediction;
+use selection::{Chosen, Selected, select};
+use verdict::{
+    ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, Recalibrated, SCHEMA, Trace, Verdict,
+};
+
+/// Contacts of each tendon while candidates are tried; the trapezoidal error of eight is below 0.2 % for every wrap.
+const SEARCH_ELEMENTS: usize = 8;
+
+/// Simulation step while candidates are tried, s.
+const SEARCH_STEP_S: f64 = 1e-3;
+
+/// Relative change of a parameter from which on it counts as wrong: benches are a few per cent off their files.
+const WRONG_PARAMETER: f64 = 0.15;
+
+/// Optimiser evaluations per parameter of the last fit.
+const FINAL_PATIENCE: usize = 8;
+
+/// Everything that a diagnosis yields.
+#[derive(Clone, Debug)]
+pub struct Diagnosed {
+    /// Verdict, plots and numbers.
+    pub findings: Findings,
+    /// Nominal parameters that fit: section, name, value.
+    parameters: Vec<(&'static str, &'static str, f64)>,
+    effects: Vec<ActiveEffect>,
+}
+
+impl Diagnosed {
+    /// Writes the diagnosed physics into a rig file.
+    ///
+    /// # Errors
+    /// When the file cannot take a value.
+    pub fn write_into(&self, document: &mut RigDocument) -> Result<(), Failure> {
+        for (section, name, value) in &self.parameters {
+            document.set_nominal(section, name, *value)?;
+        }
+        for effect in &self.effects {
+            document.add_effect(effect)?;
+        }
+        Ok(())
+    }
+}
+
+/// Diagnoses `training`, and proves the result on `heldout`; without held-out recordings, stretches of the training
+/// recordings are held out.
+///
+/// # Errors
+/// When the recordings cannot drive the rig or hold nothing to compare.
+pub fn diagnose(
+    rig: &Rig,
+    training: &[Recording],
+    heldout: &[Recording],
+    progress: &dyn Progress,
+) -> Result<Diagnosed, Failure> {
+    let first = training.first().ok_or_else(|| Failure::bad_input("no recording to diagnose; name at least one"))?;
+    let model = JointModel::from_rig(rig, first)?;
+    let objective = Objective::new(&model, training, heldout, heldout.is_empty())?;
+    let search = JointModel {
+        elements: model.elements.min(SEARCH_ELEMENTS),
+        step_s: model.step_s.max(SEARCH_STEP_S),
+        ..model.clone()
+    };
+    let selected = select(&objective, &search, progress)?;
+    let last = refine(&objective, &model, &selected, progress)?;
+    let before = objective.predict(&model)?;
+    let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
+    let after = objective.predict(&last.model)?;
+    let stages = Stages { before, recalibrated, after };
+    Ok(report(rig, &objective, &model, &selected, &last, &stages, training, heldout))
+}
+
+/// Predictions at the three stages of a diagnosis.
+pub(crate) struct Stages {
+    pub before: Vec<Prediction>,
+    pub recalibrated: Vec<Prediction>,
+    pub after: Vec<Prediction>,
+}
+
+fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
+    JointModel { elements: model.elements, step_s: model.step_s, ..searched.clone() }
+}
+
+/// Fits the chosen physics at the rig's own resolution to all data that may be fitted.
+fn refine(
+    objective: &Objective,
+    model: &JointModel,
+    selected: &Selected,
+    progress: &dyn Progress,
+) -> Result<Solution, Failure> {
+    progress.stage("refining", 0);
+    let start = at_full_resolution(&selected.solution.model, model);
+    let mut free = recalibrated(&start);
+    for effect in model.effects.len()..start.effects.len() {
+        free.extend(Free::of_effect(&start, effect));
+    }
+    solve_in_rounds(objective, &start, &free, FINAL_PATIENCE, &[FINE_STEP])
+}
+
+#[allow(clippy::too_many_arguments)]
+fn report(
+    rig: &Rig,
+    objective: &Objective,
+    model: &JointModel,
+    selected: &Selected,
+    last: &Solution,
+    stages: &Stages,
+    training: &[Recording],
+    heldout: &[Recording],
+) -> Diagnosed {
+    let nominal = recalibrated(model);
+    let recalibrated_parameters: Vec<Recalibrated> = nominal
+        .iter()
+        .zip(&last.values)
+        .zip(&last.stds)
+        .map(|((free, value), std)| Recalibrated {
+            parameter: free.path(model),
+            nominal: free.start(),
+            fitted: *value,
+            std: *std,
+            unit: free.spec().unit.to_owned(),
+            at_bound: free.at_bound(*value),
+        })
+        .collect();
+    let own = model.effects.len();
+    let mut first_value = nominal.len();
+    let mut effects = Vec::new();
+    for (index, chosen) in selected.chosen.iter().enumerate() {
+        let active = last.model.effects[own + index];
+        let count = active.descriptor().parameters.len();
+        let values = first_value..first_value + count;
+        effects.push(named(active, chosen, &last.stds[values], objective));
+        first_value += count;
+    }
+    effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let left = objective.compare(&stages.after);
+    let unexplained = unexplained::unexplained(objective, model, &left);
+    let wrong = recalibrated_parameters.iter().any(|p| (p.fitted / p.nominal - 1.0).abs() > WRONG_PARAMETER);
+    let loss_before = objective.mean_loss(&objective.compare(&stages.before), Part::HeldOut);
+    let loss_recalibrated = objective.mean_loss(&objective.compare(&stages.recalibrated), Part::HeldOut);
+    let verdict = match (&effects[..], &unexplained) {
+        ([_, ..], _) => Verdict::MissingPhysics,
+        ([], Some(_)) => Verdict::Unexplained,
+        ([], None) if wrong && selection::worthwhile(loss_before, loss_recalibrated) => Verdict::Recalibrate,
+        ([], None) => Verdict::Consistent,
+    };
+    let channels: BTreeMap<String, ChannelFit> = objective
+        .scales()
+        .iter()
+        .map(|(series, _)| {
+            let rmse = |predictions: &[Prediction]| objective.rmse(predictions, *series, Part::HeldOut);
+            let fit = ChannelFit {
+                before_rmse: rmse(&stages.before),
+                recalibrated_rmse: rmse(&stages.recalibrated),
+                after_rmse: rmse(&stages.after),
+                noise_rmse: objective.noise_variance(*series).sqrt(),
+            };
+            (series.name().to_owned(), fit)
+        })
+        .collect();
+    let loss_after = objective.mean_loss(&left, Part::HeldOut);
+    let diagnosis = Diagnosis {
+        schema: SCHEMA.to_owned(),
+        verdict,
+        summary: words::summary(verdict, &effects, &recalibrated_parameters, loss_recalibrated, loss_after),
+        effects,
+        recalibrated: recalibrated_parameters,
+        indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model).unwrap_or_default(),
+        mismatch: place::mismatch(objective, &objective.compare(&stages.recalibrated)),
+        unexplained,
+        fit: Fit { heldout: true, channels },
+        rig: rig.name.clone(),
+        recordings: training.iter().map(|r| r.source().to_owned()).collect(),
+        heldout: if heldout.is_empty() {
+            vec!["every third second of each recording".to_owned()]
+        } else {
+            heldout.iter().map(|r| r.source().to_owned()).collect()
+        },
+        written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
+    };
+    let parameters = nominal
+        .iter()
+        .zip(&last.values)
+        .filter_map(|(free, value)| match free.place() {
+            crate::fit::free::Place::Nominal(parameter) => Some((parameter.section, parameter.spec.name, *value)),
+            crate::fit::free::Place::Effect { .. } => None,
+        })
+        .collect();
+    Diagnosed {
+        findings: Findings {
+            diagnosis,
+            traces: traces(objective, stages),
+            regimes: place::regimes(objective, stages),
+        },
+        parameters,
+        effects: last.model.effects[own..].to_vec(),
+    }
+}
+
+fn named(active: ActiveEffect, chosen: &Chosen, stds: &[Option<f64>], objective: &Objective) -> NamedEffect {
+    let descriptor = active.descriptor();
+    let improvement = 1.0 - chosen.loss_after / chosen.loss_before;
+    let (probability, rivals) = words::rivals(chosen, improvement);
+    let parameters = descriptor
+        .parameters
+        .iter()
+        .zip(active.parameters)
+        .zip(stds)
+        .map(|((spec, value), std)| {
+            let at_bound = value <= spec.lower || value >= spec.upper;
+            (spec.name.to_owned(), Estimate { value, std: *std, unit: spec.unit.to_owned(), at_bound })
+        })
+        .collect();
+    let onset_s = descriptor
+        .parameters
+        .iter()
+        .position(|spec| spec.name == "time_s" || spec.name == "start_s")
+        .map(|index| active.parameters[index]);
+    NamedEffect {
+        id: descriptor.id.to_owned(),
+        component: descriptor.component.name().to_owned(),
+        probability,
+        onset_s,
+        channel: active.target.name().map(str::to_owned),
+        parameters,
+        heldout_improvement: improvement,
+        sentence: words::sentence(&active, improvement, objective.duration_s()),
+        rivals,
+    }
+}
+
+/// Traces of the first recording.
+fn traces(objective: &Objective, stages: &Stages) -> Vec<Trace> {
+    let input = objective.input(0);
+    let mut held_out = vec![false; input.t_s().len()];
+    for block in objective.blocks(0).iter().filter(|block| block.part == Part::HeldOut) {
+        held_out[block.start..block.end].fill(true);
+    }
+    let series_of = |prediction: &Prediction, series: Series| match series {
+        Series::Channel(channel) => prediction.channel(channel).map(<[f64]>::to_vec),
+        Series::Guide => Some(prediction.guide_nm.clone()),
+    };
+    objective
+        .scales()
+        .iter()
+        .filter_map(|(series, _)| {
+            Some(Trace {
+                channel: series.name().to_owned(),
+                unit: match series {
+                    Series::Channel(channel) => channel.unit().to_owned(),
+                    Series::Guide => "N m".to_owned(),
+                },
+                t_s: input.t_s().to_vec(),
+                measured: objective.measured(0, *series)?.to_vec(),
+                before: series_of(&stages.before[0], *series)?,
+                after: series_of(&stages.after[0], *series)?,
+                held_out: held_out.clone(),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,210 @@
+//! What could be missing: every effect of the catalogue, each with the starting points from which its parameters are
+//! looked for.
+
+use std::f64::consts::TAU;
+
+use bowden_model::channel::Channel;
+use bowden_model::effect::{ActiveEffect, Component, Descriptor, Target};
+use bowden_model::effects::CATALOGUE;
+
+use crate::fit::objective::{Objective, Series};
+use crate::joint_model::JointModel;
+use crate::simulation::Prediction;
+
+/// Moments at which an effect with an onset is tried, spread over the recording.
+const ONSETS: usize = 12;
+
+/// Periods per turn at which cogging is looked for.
+const COGGING_PERIODS: std::ops::RangeInclusive<usize> = 2..=240;
+
+/// One effect and where to start.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The effect at its starting points; a sensor's effect stands once for every channel it may be on.
+    pub starts: Vec<ActiveEffect>,
+}
+
+/// All effects that the parts of `model` can have and that it does not contain yet.
+///
+/// `predictions` are those of `model`; effects whose starting point can be read off their differences use them.
+#[must_use]
+pub fn candidates(model: &JointModel, objective: &Objective, predictions: &[Prediction]) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    for effect in CATALOGUE {
+        let descriptor = effect.descriptor();
+        if !fits(model, descriptor.component) {
+            continue;
+        }
+        for target in targets(model, descriptor) {
+            let contained = model.effects.iter().any(|active| {
+                active.descriptor().id == descriptor.id && (target == Target::None || overlaps(active.target, target))
+            });
+            if contained {
+                continue;
+            }
+            let base = ActiveEffect { target, ..ActiveEffect::with_defaults(effect) };
+            let starts = starts(base, model, objective, predictions);
+            if !starts.is_empty() {
+                found.push(Candidate { starts });
+            }
+        }
+    }
+    found
+}
+
+fn fits(model: &JointModel, component: Component) -> bool {
+    match component {
+        Component::Motor => model.parameters.motor.is_some(),
+        Component::Transmission => model.parameters.tendon.is_some(),
+        Component::Joint | Component::Sensors => true,
+    }
+}
+
+fn overlaps(a: Target, b: Target) -> bool {
+    Channel::ALL.into_iter().any(|channel| a.includes(channel) && b.includes(channel))
+}
+
+fn targets(model: &JointModel, descriptor: &Descriptor) -> Vec<Target> {
+    if descriptor.channels.is_empty() {
+        return vec![Target::None];
+    }
+    let simulated = |channel: &Channel| {
+        // Zero and gain of an angle that drives the replay show in what follows from it.
+        let invertible = matches!(descriptor.id, "encoder_eccentricity" | "sensor_gain_error");
+        model.outputs.contains(channel) || (invertible && model.inputs.contains(channel))
+    };
+    let mut targets: Vec<Target> =
+        descriptor.channels.iter().filter(|c| simulated(c)).map(|c| Target::One(*c)).collect();
+    let all_tensions = Channel::TENSIONS.iter().all(|c| descriptor.channels.contains(c) && model.outputs.contains(c));
+    if all_tensions && descriptor.id == "sensor_lag" {
+        targets.push(Target::Tensions);
+    }
+    targets
+}
+
+fn starts(
+    base: ActiveEffect,
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Vec<ActiveEffect> {
+    let parameters = base.descriptor().parameters;
+    let strength = parameters.first();
+    let signed = strength.is_some_and(|spec| spec.lower < 0.0);
+    let both_signs = |value: f64| if signed { vec![value, -value] } else { vec![value] };
+    let duration_s = objective.duration_s();
+    let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
+    match base.descriptor().id {
+        "motor_cogging" => cogging_start(base, objective, predictions).into_iter().collect(),
+        "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
+        "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
+        "end_stop_contact" => end_stop_starts(base, model, objective),
+        "encoder_eccentricity" => {
+            (0..4).map(|quarter| base.with("phase_rad", f64::from(quarter) * TAU / 4.0 - TAU / 2.0 + 0.01)).collect()
+        }
+        "sensor_gain_error" => [0.92, 1.08].map(|gain| base.with("gain", gain)).to_vec(),
+        "sensor_lag" => [0.01, 0.05].map(|lag| base.with("time_constant_s", lag)).to_vec(),
+        _ => {
+            let Some(strength) = strength else { return vec![base] };
+            let values: Vec<f64> =
+                [0.4, 1.0, 2.5].iter().flat_map(|factor| both_signs(from_neutral(base, strength.default, *factor))).collect();
+            let with_strength = |start: &ActiveEffect, value: f64| {
+                start.with(strength.name, value.clamp(strength.lower, strength.upper))
+            };
+            match onset {
+                // One strength for every moment; the strength is found once the moment is.
+                Some(onset) => (0..ONSETS)
+                    .flat_map(|k| {
+                        let at = base
+                            .with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
+                            .with("duration_s", duration_s / 6.0);
+                        both_signs(strength.default).into_iter().map(move |value| at.with(strength.name, value))
+                    })
+                    .collect(),
+                None => values.into_iter().map(|value| with_strength(&base, value)).collect(),
+            }
+        }
+    }
+}
+
+/// The default strength, with its distance from no effect scaled by `factor`.
+fn from_neutral(base: ActiveEffect, default: f64, factor: f64) -> f64 {
+    let neutral = base.descriptor().neutral.unwrap_or(0.0);
+    neutral + factor * (default - neutral)
+}
+
+/// Amplitude, period and phase from the torque that guided the motor, by least squares over every whole period.
+fn cogging_start(base: ActiveEffect, objective: &Objective, predictions: &[Prediction]) -> Option<ActiveEffect> {
+    let mut best: Option<(f64, ActiveEffect)> = None;
+    for periods in COGGING_PERIODS {
+        let n = periods as f64;
+        let (mut ss, mut cc, mut sc, mut sg, mut cg) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (recording, prediction) in predictions.iter().enumerate() {
+            let motion = objective.input(recording).motion()?;
+            for (k, guide) in prediction.guide_nm.iter().enumerate().step_by(5) {
+                // A motor that stands tells nothing about the position lock.
+                if motion.omega_rad_s[k].abs() < 0.02 {
+                    continue;
+                }
+                let (sin, cos) = (n * motion.theta_rad[k]).sin_cos();
+                ss += sin * sin;
+                cc += cos * cos;
+                sc += sin * cos;
+                sg += sin * guide;
+                cg += cos * guide;
+            }
+        }
+        let determinant = ss * cc - sc * sc;
+        if determinant <= 1e-9 * ss * cc {
+            continue;
+        }
+        let (a, b) = ((sg * cc - cg * sc) / determinant, (cg * ss - sg * sc) / determinant);
+        let gain = a * sg + b * cg;
+        if best.as_ref().is_none_or(|(most, _)| gain > *most) {
+            let start = base.with("amplitude_nm", a.hypot(b)).with("cycles_per_turn", n).with("phase_rad", b.atan2(a));
+            best = Some((gain, start));
+        }
+    }
+    best.map(|(_, start)| start)
+}
+
+/// Offset from the mean difference of the channel.
+fn offset_start(base: ActiveEffect, objective: &Objective, predictions: &[Prediction]) -> Option<ActiveEffect> {
+    let Target::One(channel) = base.target else { return None };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (recording, prediction) in predictions.iter().enumerate() {
+        let measured = objective.measured(recording, Series::Channel(channel))?;
+        for (m, p) in measured.iter().zip(prediction.channel(channel)?) {
+            sum += m - p;
+            count += 1.0;
+        }
+    }
+    Some(base.with("offset", sum / f64::max(count, 1.0)))
+}
+
+/// Limit at the largest value that was shown.
+fn saturation_start(base: ActiveEffect, objective: &Objective) -> Option<ActiveEffect> {
+    let Target::One(channel) = base.target else { return None };
+    let largest = (0..objective.recordings())
+        .filter_map(|recording| objective.measured(recording, Series::Channel(channel)))
+        .flatten()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    Some(base.with("limit", largest))
+}
+
+/// Stops at nine tenths and seven tenths of the travel, on both sides.
+fn end_stop_starts(base: ActiveEffect, model: &JointModel, objective: &Objective) -> Vec<ActiveEffect> {
+    let channel = if model.outputs.contains(&Channel::ThetaOut) { Channel::ThetaOut } else { Channel::ThetaIn };
+    let travel: Vec<f64> = (0..objective.recordings())
+        .filter_map(|recording| objective.measured(recording, Series::Channel(channel)))
+        .flatten()
+        .copied()
+        .collect();
+    let (low, high) = travel.iter().fold((0.0_f64, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    [0.95, 0.8, 0.6]
+        .iter()
+        .flat_map(|share| [base.with("stop_rad", share * high), base.with("stop_rad", share * low)])
+        .filter(|start| start.parameters[1].abs() > 1e-3)
+        .collect()
+}

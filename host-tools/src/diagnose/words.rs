@@ -1,0 +1,134 @@
+//! Sentences for people.
+
+use std::fmt::Write;
+
+use bowden_model::effect::{ActiveEffect, Component};
+
+use super::selection::Chosen;
+use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
+
+/// Sharpness with which a ratio of held-out losses turns into odds: a candidate that leaves a fifth more is six times
+/// less likely.
+const ODDS_PER_LOSS_RATIO: f64 = 10.0;
+
+/// Improvement at which an effect is as likely as not.
+const EVEN_IMPROVEMENT: f64 = 0.1;
+
+/// Odds below which a rival is not listed.
+const LISTED_ODDS: f64 = 0.03;
+
+/// Probability of the chosen effect, and what it could be instead.
+pub(super) fn rivals(chosen: &Chosen, improvement: f64) -> (f64, Vec<Rival>) {
+    let own_id = chosen.effect.descriptor().id;
+    let odds: Vec<(&str, f64, Component)> = chosen
+        .others
+        .iter()
+        .filter(|tried| tried.effect.descriptor().id != own_id)
+        .map(|tried| {
+            let ratio = tried.heldout_loss / chosen.loss_after;
+            let descriptor = tried.effect.descriptor();
+            (descriptor.id, ratio.powf(-ODDS_PER_LOSS_RATIO), descriptor.component)
+        })
+        .collect();
+    let sum: f64 = 1.0 + odds.iter().map(|(_, odds, _)| odds).sum::<f64>();
+    let present = 1.0 - 0.5 * (-(improvement - EVEN_IMPROVEMENT).max(0.0) / EVEN_IMPROVEMENT).exp();
+    let mut rivals: Vec<Rival> = Vec::new();
+    for (id, odds, component) in odds {
+        if odds > LISTED_ODDS && rivals.iter().all(|rival| rival.id != id) {
+            rivals.push(Rival {
+                id: id.to_owned(),
+                probability: present * odds / sum,
+                separating_experiment: experiment(id, component).to_owned(),
+            });
+        }
+    }
+    (present / sum, rivals)
+}
+
+/// What to record so that an effect shows apart from others.
+fn experiment(id: &str, component: Component) -> &'static str {
+    match id {
+        "motor_coulomb_friction" | "motor_viscous_friction" | "motor_stribeck_friction" => {
+            "constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded"
+        }
+        "gear_load_friction" => "the same slow triangle with the arm unloaded and with full weight",
+        "motor_cogging" => "one slow turn at constant speed in each direction with the tendons at low pretension",
+        "sheath_viscous_friction" | "sheath_stribeck_friction" => {
+            "triangles of equal amplitude at five speeds over two decades"
+        }
+        "bending_friction" => "the same slow triangle at three pretensions",
+        "asymmetric_friction" => "slow triangles with the weight pulling on cable a, then on cable b",
+        "joint_backlash" | "transmission_backlash" | "gear_backlash" => {
+            "slow small triangles about the hanging position, where the torque changes sign"
+        }
+        "joint_spring" | "payload_change" => "holding at five poses across the whole range for two seconds each",
+        "wrap_angle_varies_with_pose" => "small slow triangles at five poses across the whole range",
+        _ => match component {
+            Component::Motor => "slow triangles with the tendons unloaded",
+            Component::Transmission => "slow triangles at three amplitudes with holds of two seconds at the ends",
+            Component::Joint => "slow triangles with the weight removed",
+            Component::Sensors => "the same motion with the channel's sensor exchanged for its neighbour's",
+        },
+    }
+}
+
+/// One plain sentence on an effect.
+pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64) -> String {
+    let descriptor = active.descriptor();
+    let mut text = String::new();
+    let mut summary = descriptor.summary.chars();
+    if let Some(first) = summary.next() {
+        let _ = write!(text, "{}{}", first.to_uppercase(), summary.as_str());
+    }
+    if let Some(channel) = active.target.name() {
+        let _ = write!(text, " ({channel})");
+    }
+    for (spec, value) in descriptor.parameters.iter().zip(active.parameters).take(2) {
+        let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
+        let name = spec.meaning;
+        if spec.name.ends_with("time_s") || spec.name == "start_s" {
+            let _ = write!(text, ", at {value:.2} s of {duration_s:.0} s");
+        } else {
+            let _ = write!(text, ", {name} {value:.3e}{unit}");
+        }
+    }
+    let _ = write!(text, "; it removes {:.0} % of the difference on data the fit did not see.", 100.0 * improvement);
+    text
+}
+
+/// The diagnosis in two sentences.
+pub(super) fn summary(
+    verdict: Verdict,
+    effects: &[NamedEffect],
+    recalibrated: &[Recalibrated],
+    loss_recalibrated: f64,
+    loss_after: f64,
+) -> String {
+    let changed: Vec<String> = recalibrated
+        .iter()
+        .filter(|p| (p.fitted / p.nominal - 1.0).abs() > super::WRONG_PARAMETER)
+        .map(|p| format!("{} {:+.0} %", p.parameter, 100.0 * (p.fitted / p.nominal - 1.0)))
+        .collect();
+    let parameters = if changed.is_empty() {
+        "All nominal parameters are within 15 % of the rig file.".to_owned()
+    } else {
+        format!("Parameters that were off: {}.", changed.join(", "))
+    };
+    match verdict {
+        Verdict::Consistent => {
+            format!("The simulation agrees with the recordings; nothing is worth adding or changing. {parameters}")
+        }
+        Verdict::Recalibrate => format!("Parameters were off and no physics is missing. {parameters}"),
+        Verdict::MissingPhysics => {
+            let names: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
+            format!(
+                "The simulation lacks {}: adding it brings the held-out loss from {loss_recalibrated:.2} to \
+                 {loss_after:.2} (1 is the usual difference between two realities). {parameters}",
+                names.join(" and ")
+            )
+        }
+        Verdict::Unexplained => {
+            format!("The recordings hold structure that no effect of the catalogue explains. {parameters}")
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Scores on recordings of real benches, held out recording by recording.
+//!
+//! A score counts only for a recording that the fit has not seen: every recording is left out once, all parameters are
+//! fitted to the others, and the left-out one is replayed. The physics itself was chosen by people who had seen all
+//! recordings; `docs/real-recordings.md` says how far that reaches.
+
+pub mod cable_tool;
+pub mod joint_fit;
+pub mod servo_pendulum;
+mod table;
+
+use crate::outcome::Failure;
+
+pub use table::Table;
+
+/// What a data set demands of the physics that is meant to explain it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// What is scored, with its unit.
+    pub quantity: &'static str,
+    /// Score over all held-out recordings.
+    pub score: f64,
+    /// Largest score that passes.
+    pub limit: f64,
+}
+
+impl Mark {
+    /// Whether the score passes; a score that is not a number does not.
+    #[must_use]
+    pub fn met(&self) -> bool {
+        self.score <= self.limit
+    }
+}
+
+impl std::fmt::Display for Mark {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let verdict = if self.met() { "met" } else { "MISSED" };
+        write!(f, "{}: {:.4}, mark {:.4}: {verdict}", self.quantity, self.score, self.limit)
+    }
+}
+
+/// Root of the mean square.
+#[must_use]
+pub fn root_mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value * value;
+        count += 1.0;
+    }
+    f64::sqrt(sum / count)
+}
+
+/// Mean.
+#[must_use]
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value;
+        count += 1.0;
+    }
+    sum / count
+}
+
+/// Names of the recordings in the manifest of a data set, in its order.
+///
+/// # Errors
+/// When the manifest cannot be read or names none.
+pub fn listed_recordings(folder: &std::path::Path) -> Result<Vec<String>, Failure> {
+    let path = folder.join("manifest.csv");
+    let unusable = |reason: String| {
+        Failure::bad_input(format!("{}: {reason}; name the folder that holds the data sets", path.display()))
+    };
+    let mut reader = csv::Reader::from_path(&path).map_err(|error| unusable(error.to_string()))?;
+    let mut names = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|error| unusable(error.to_string()))?;
+        names.extend(row.get(0).and_then(|file| file.strip_suffix(".csv")).map(str::to_owned));
+    }
+    names.sort_unstable();
+    if names.is_empty() { Err(unusable("lists no recordings".to_owned())) } else { Ok(names) }
+}

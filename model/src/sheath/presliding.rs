@@ -1,0 +1,102 @@
+//! Contacts that give way elastically before they slip: Dahl's law at every contact of a tendon.
+//!
+//! A contact keeps its share of friction as tension changes and loses the distance to the limit with its own travel:
+//!
+//! ```text
+//! g_i = T_{i+1} - (e^{-μ K w_i} T_i - o_i),   dg_i = -g_i dx_i / δ   (end i pulled; released: with the other limit)
+//! ```
+//!
+//! `x_i` is what the tendon moved at the contact, `δ` the presliding displacement: after a travel of δ, 63 % of the way to
+//! the limit is done. δ → 0 is the rigid contact of [`super`]. Seen from the end that moves the tendon is a ladder; its
+//! compliance `X_j = c_j + r_j X_{j+1} / (1 + κ_j X_{j+1})` follows from the far end inwards with positive terms only,
+//! and the tensions from a second pass outwards. First order in `step / δ` and in `μK / n`, stable for any step.
+//!
+//! Dahl's law has no memory of turning points: a small loop inside a large one does not close exactly, and under a steady
+//! pull a small vibration creeps. Source: P. R. Dahl, Aerospace report TOR-158(3107-18), 1968.
+
+use libm::expm1;
+
+use super::{End, MAX_ELEMENTS, SlipLimits, Tendon, TendonMesh};
+
+/// Largest part of a ladder's own compliance by which a contact beyond its limit may raise it: such a contact, as after
+/// a drop of friction, comes back within a travel of δ.
+const LARGEST_RETURN: f64 = 0.5;
+
+impl Tendon {
+    /// Moves one end by `pull_m` (positive stretches the tendon) with contacts that give way over `presliding_m` > 0.
+    ///
+    /// `unilateral` as for [`Tendon::move_end`]; a part that pushes carries no further friction.
+    pub fn move_end_presliding(
+        &mut self,
+        mesh: &TendonMesh,
+        limits: &SlipLimits,
+        end: End,
+        mut pull_m: f64,
+        unilateral: bool,
+        presliding_m: f64,
+    ) {
+        let index = end as usize;
+        if pull_m > 0.0 {
+            let taken = pull_m.min(self.slack_m[index]);
+            self.slack_m[index] -= taken;
+            pull_m -= taken;
+        }
+        if pull_m == 0.0 {
+            return;
+        }
+        self.fill_in(mesh);
+        self.full_slip = None;
+        let n = mesh.elements;
+        let from_output = end == End::Output;
+        let segment = |j: usize| if from_output { n - j } else { j };
+        let contact = |i: usize| if from_output { n - 1 - i } else { i };
+        let pulled = pull_m > 0.0;
+        // No contact travels farther than the end: the chord of the exponential up to there never passes the limit.
+        let decay_per_m = -expm1(-pull_m.abs() / presliding_m) / pull_m.abs();
+
+        // Per contact: dT_{j+1} = slope dT_j - grip x, turned into x = share X_{j+1} dT_j.
+        let mut share = [0.0; MAX_ELEMENTS + 1];
+        let mut compliance = [0.0; MAX_ELEMENTS + 1];
+        compliance[n] = mesh.compliance_m_per_n[segment(n)];
+        for i in (0..n).rev() {
+            let (near, far) = (self.tension_n[segment(i)], self.tension_n[segment(i + 1)]);
+            let (down, up) = (limits.ratio[contact(i)], limits.inverse_ratio[contact(i)]);
+            let offset = limits.offset_share[contact(i)];
+            let range = (up - down) * near + (up + 1.0) * offset;
+            let behind = compliance[i + 1];
+            let (slope, grip) = if range > 0.0 && near > 0.0 {
+                let above = far - (down * near - offset);
+                let gap = if pulled { above } else { range - above };
+                (down + (above / range).clamp(0.0, 1.0) * (up - down), gap * decay_per_m)
+            } else {
+                (1.0, 0.0)
+            };
+            share[i] = slope / (1.0 + (grip * behind).max(-LARGEST_RETURN));
+            compliance[i] = mesh.compliance_m_per_n[segment(i)] + share[i] * behind;
+        }
+
+        let mut rise_n = pull_m / compliance[0];
+        let tension = self.tension_n[segment(0)];
+        if unilateral && tension + rise_n < 0.0 {
+            self.slack_m[index] -= (tension + rise_n) * compliance[0];
+            rise_n = -tension;
+        }
+        self.front[index] = n;
+        self.stiffness_n_per_m[index] = 1.0 / compliance[0];
+        for (j, share) in share.iter().enumerate().take(n + 1) {
+            let tension = self.tension_n[segment(j)] + rise_n;
+            let floor = if unilateral { 0.0 } else { f64::NEG_INFINITY };
+            self.tension_n[segment(j)] = tension.max(floor);
+            // What a segment would push is slack instead.
+            self.slack_m[index] += (floor - tension).max(0.0) * mesh.compliance_m_per_n[segment(j)];
+            rise_n *= share;
+        }
+        let far = if from_output { End::Input } else { End::Output };
+        let loose_m = self.slack_m[far as usize];
+        if unilateral && loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
+            // The far end hangs loose: let it slide in until it is tight or carries nothing.
+            self.slack_m[far as usize] = 0.0;
+            self.move_end_presliding(mesh, limits, far, -loose_m, unilateral, presliding_m);
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! Motor, motor-driven joint and the convergence of the whole in time.
+
+#[path = "common/joint.rs"]
+mod joint;
+#[path = "common/motor.rs"]
+mod motor;
+#[path = "common/near.rs"]
+mod near;
+
+use bowden_model::drive::BridgeInput;
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effect_set::EffectSet;
+use bowden_model::effects;
+use bowden_model::parameters::{FrictionLaw, JointParameters, SensorParameters};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, PlantError, StepInput};
+use joint::{IDLE, INERTIA_KG_M2, RADIUS_M, Run, STIFFNESS_N_PER_M, WEIGHT_NM, joint};
+use motor::{MOTOR, PULLEY_INERTIA_KG_M2, PULLEY_NM_PER_A};
+use near::near;
+
+const MOTOR_AND_ARM: (InputBoundary, OutputBoundary) = (InputBoundary::Motor, OutputBoundary::Arm);
+
+fn bare_motor() -> JointParameters {
+    JointParameters {
+        motor: Some(MOTOR),
+        pulleys: None,
+        tendon: None,
+        sheath: None,
+        load: None,
+        sensors: SensorParameters::default(),
+        friction: FrictionLaw::Distributed,
+    }
+}
+
+fn duty(duty: f64) -> StepInput {
+    StepInput { bridge: BridgeInput { duty, bus_v: 24.0, enabled: true }, ..IDLE }
+}
+
+/// Without load: ω = k V/(R b + k²), i = b ω/k with k = k_t N. A thousand time constants later only rounding is left.
+#[test]
+fn free_run() {
+    for level in [1.0, -0.3] {
+        let mut run = Run::new(bare_motor(), &[], MOTOR_AND_ARM, 5e-4);
+        run.until(20.0, |_| duty(level));
+        let speed = PULLEY_NM_PER_A * 24.0 * level / (2.0 * 0.02 + PULLEY_NM_PER_A * PULLEY_NM_PER_A);
+        near("speed", run.plant.omega_out_rad_s(), speed, 1e-9);
+        near("current", run.plant.current_a(), 0.02 * speed / PULLEY_NM_PER_A, 1e-9);
+    }
+}
+
+/// Blocked: i = (V/R)(1 - e^{-t R/L}), in the end the stall current. Implicit Euler lags by half a step: dt/2 (V/L) e^{-t R/L}.
+#[test]
+fn blocked_motor_current() {
+    let boundaries = (InputBoundary::Angle, OutputBoundary::Arm);
+    for dt_s in [1e-5, 5e-6] {
+        let mut run = Run::new(bare_motor(), &[], boundaries, dt_s);
+        run.until(5e-4, |_| duty(1.0));
+        near(
+            "after L/R",
+            run.plant.current_a(),
+            12.0 * (1.0 - (-1.0_f64).exp()),
+            0.55 * dt_s * 24e3 * (-1.0_f64).exp(),
+        );
+        run.until(2e-2, |_| duty(1.0));
+        near("stall", run.plant.current_a(), 12.0, 1e-9);
+    }
+    let mut run = Run::new(bare_motor(), &[], boundaries, 5e-4);
+    run.until(0.1, |_| duty(1.0));
+    near("stall at a step of one L/R", run.plant.current_a(), 12.0, 1e-9);
+    run.until(0.1005, |_| StepInput {
+        bridge: BridgeInput { duty: 1.0, bus_v: 24.0, enabled: false },
+        ..IDLE
+    });
+    assert_eq!(run.plant.current_a(), 0.0);
+}
+
+/// Motor with the weight on its shaft, by classic Runge-Kutta with a step of 10 µs.
+fn pendulum(until_s: f64, duty: impl Fn(f64) -> f64) -> [f64; 3] {
+    let h = 1e-5;
+    let slope = |t: f64, [current, theta, omega]: [f64; 3]| {
+        [
+            (duty(t) * 24.0 - 2.0 * current - PULLEY_NM_PER_A * omega) / 1e-3,
+            omega,
+            (PULLEY_NM_PER_A * current - 0.024 * omega - WEIGHT_NM * theta.sin())
+                / (PULLEY_INERTIA_KG_M2 + INERTIA_KG_M2),
+        ]
+    };
+    let ahead = |at: [f64; 3], k: [f64; 3], h: f64| [at[0] + h * k[0], at[1] + h * k[1], at[2] + h * k[2]];
+    let mut at = [0.0; 3];
+    for step in 0..(until_s / h).round() as usize {
+        let t = h * step as f64;
+        let k1 = slope(t, at);
+        let k2 = slope(t + 0.5 * h, ahead(at, k1, 0.5 * h));
+        let k3 = slope(t + 0.5 * h, ahead(at, k2, 0.5 * h));
+        let k4 = slope(t + h, ahead(at, k3, h));
+        for i in 0..3 {
+            at[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+        }
+    }
+    at
+}
+
+/// A motor that swings the weight directly: first order in the step against Runge-Kutta, 1 mrad at 0.25 ms.
+#[test]
+fn direct_pendulum_converges_to_runge_kutta() {
+    let mut parameters = bare_motor();
+    parameters.load = joint(0.0).load;
+    let drive = |t: f64| 0.08 * (7.0 * t).sin();
+    let want = pendulum(1.5, drive);
+    let errors = [1e-3, 5e-4, 2.5e-4].map(|dt_s| {
+        let mut run = Run::new(parameters, &[], MOTOR_AND_ARM, dt_s);
+        run.until(1.5, |t| duty(drive(t)));
+        [
+            (run.plant.theta_out_rad() - want[1]).abs(),
+            (run.plant.omega_out_rad_s() - want[2]).abs(),
+            (run.plant.current_a() - want[0]).abs(),
+        ]
+    });
+    assert!(errors[2][0] < 1e-3 && errors[2][1] < 1e-2 && errors[2][2] < 1e-2, "{errors:?} from {want:?}");
+    for i in 0..2 {
+        assert!(errors[0][i] > 3.4 * errors[2][i], "not of first order: {errors:?}");
+    }
+}
+
+/// Dry friction of the motor: no motion at all below breakaway, and with weight it holds the arm where it is.
+#[test]
+fn motor_friction_holds_below_breakaway() {
+    let dry = ActiveEffect::with_defaults(effects::find("motor_coulomb_friction").unwrap());
+    let mut run = Run::new(bare_motor(), &[dry], MOTOR_AND_ARM, 5e-4);
+    // Breakaway at τ R/(k V) = 0.08 · 2/(0.9 · 24) = 0.7407 % duty.
+    run.until(2.0, |t| duty(0.5 * 0.0074 * t));
+    assert_eq!(run.plant.theta_out_rad(), 0.0);
+    run.until(2.2, |_| duty(0.0075));
+    assert!(run.plant.theta_out_rad() > 0.0);
+}
+
+/// A motor-driven joint at rest under a constant duty carries the weight: k i = (r1/r2) T_out without friction.
+#[test]
+fn motor_carries_the_weight_through_the_cables() {
+    let mut parameters = joint(0.0);
+    parameters.motor = Some(MOTOR);
+    let mut run = Run::new(parameters, &[], MOTOR_AND_ARM, 5e-4);
+    let level = 0.015;
+    run.until(20.0, |_| duty(level));
+    let torque_nm = PULLEY_NM_PER_A * level * 12.0;
+    near("weight", WEIGHT_NM * run.plant.theta_out_rad().sin(), torque_nm, 1e-9);
+    near("input torque", run.plant.torque_in_nm(&run.config), torque_nm, 1e-9);
+    let lag = torque_nm / (2.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M);
+    near("stretch", run.plant.theta_in_rad() - run.plant.theta_out_rad(), lag, 1e-9);
+}
+
+/// Two runs of the same are the same to the last bit.
+#[test]
+fn runs_repeat_bit_for_bit() {
+    let one = || {
+        let mut parameters = joint(0.12);
+        parameters.motor = Some(MOTOR);
+        let mut run = Run::new(parameters, &[], MOTOR_AND_ARM, 5e-4);
+        run.until(3.0, |t| duty(0.1 * (5.0 * t).sin()));
+        run.plant
+    };
+    assert_eq!(one(), one());
+}
+
+/// The whole joint with distributed friction on a sine: halving the step at least halves the distance to a run of 15.6 µs,
+/// over all samples of F1 to F4 and the angle. At 0.5 ms the tensions are within 0.02 N and the angle within 15 µrad, RMS.
+#[test]
+fn joint_with_distributed_friction_converges_in_time() {
+    let trace = |dt_s: f64| -> Vec<[f64; 5]> {
+        let boundaries = (InputBoundary::Angle, OutputBoundary::Arm);
+        let mut run = Run::new(joint(0.12), &[], boundaries, dt_s);
+        (1..=300)
+            .map(|sample| {
+                run.until(0.01 * f64::from(sample), |t| StepInput {
+                    theta_in_rad: 0.5 * (1.0 - (std::f64::consts::TAU * 0.5 * t).cos()),
+                    ..IDLE
+                });
+                let [f1, f2, f3, f4] = run.tensions_n();
+                [f1, f2, f3, f4, run.plant.theta_out_rad()]
+            })
+            .collect()
+    };
+    let finest = trace(0.5e-3 / 32.0);
+    let errors = [1e-3, 5e-4, 2.5e-4, 1.25e-4].map(|dt_s| {
+        let mut sums = [0.0; 2];
+        for (got, want) in trace(dt_s).iter().zip(&finest) {
+            for i in 0..4 {
+                sums[0] += (got[i] - want[i]).powi(2) / 1200.0;
+            }
+            sums[1] += (got[4] - want[4]).powi(2) / 300.0;
+        }
+        sums.map(f64::sqrt)
+    });
+    assert!(errors[1][0] < 0.02, "{errors:?} N, rad");
+    assert!(errors[1][1] < 1.5e-5, "{errors:?} N, rad");
+    for pair in errors.windows(2) {
+        for i in 0..2 {
+            assert!(pair[0][i] > 1.7 * pair[1][i], "not of first order: {errors:?} N, rad");
+        }
+    }
+}
+
+/// Parts that are missing for a run are named.
+#[test]
+fn missing_parts_are_refused() {
+    let refuse = |parameters: JointParameters, input| {
+        PlantConfig::new(parameters, 16, EffectSet::EMPTY, input, OutputBoundary::Arm).unwrap_err()
+    };
+    assert_eq!(refuse(joint(0.1), InputBoundary::Motor), PlantError::MotorMissing);
+    let no_pulleys = JointParameters { pulleys: None, ..joint(0.1) };
+    assert_eq!(refuse(no_pulleys, InputBoundary::Angle), PlantError::PulleysMissing);
+    let nothing = JointParameters { motor: None, ..bare_motor() };
+    assert_eq!(refuse(nothing, InputBoundary::Angle), PlantError::NothingToSimulate);
+    let weightless = JointParameters { load: None, ..joint(0.1) };
+    assert_eq!(refuse(weightless, InputBoundary::Angle), PlantError::InertiaMissing);
+}
+
+/// The stated stable step is safe: ten times the ring's length later nothing has grown, at the stiffest end (all sticks).
+#[test]
+fn stable_step_is_stable() {
+    let mut parameters = joint(0.12);
+    parameters.motor = Some(MOTOR);
+    let probe = Run::new(parameters, &[], MOTOR_AND_ARM, 1e-4);
+    let dt_s = probe.config.stable_step_s();
+    // Sqrt(4 n k r²/I) of the arm with 16 contacts: 0.7/627 s.
+    near("step", dt_s, 0.7 / (64.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M / INERTIA_KG_M2).sqrt(), 1e-9);
+    let mut run = Run::new(parameters, &[], MOTOR_AND_ARM, dt_s);
+    run.plant = Plant::at_rest(&run.config, 0.0, 0.0);
+    run.until(1.0, |t| duty(if t < 0.2 { 0.1 } else { 0.0 }));
+    run.until(4.0, |_| duty(0.0));
+    assert!(run.plant.omega_out_rad_s().abs() < 1e-3, "{} rad/s", run.plant.omega_out_rad_s());
+    run.tensions_n().iter().for_each(|f| assert!((20.0..100.0).contains(f), "{f} N"));
+}
