@@ -22,6 +22,9 @@ const CORNER_HZ: f64 = 20.0;
 /// Ripple that keeps a replay from taking counts for counts: a fraction of 1/15000 of a 12-bit count.
 const RIPPLE_RAD: f64 = 1e-7;
 
+/// Angle as a replay is to see it, from the recorded one and the sampling rate in Hz.
+type Preparation = fn(&[f64], f64) -> Vec<f64>;
+
 fn main() -> ExitCode {
     let folder: PathBuf =
         [env!("CARGO_MANIFEST_DIR"), "..", "..", "shared", "concealed-examples", "example-7"]
@@ -51,7 +54,7 @@ fn compare(folder: &Path) -> Result<(), Failure> {
         rig
     };
     println!("RMS difference on held-out data            f1_n      f2_n      f3_n      f4_n  theta_out_rad");
-    let ways: [(&str, &Rig, fn(&[f64], f64) -> Vec<f64>); 4] = [
+    let ways: [(&str, &Rig, Preparation); 4] = [
         ("counts prescribed as they are", &prescribed, rippled),
         ("zero-phase 20 Hz low-pass prescribed", &prescribed, low_passed),
         ("reconstruction prescribed", &prescribed, untouched),

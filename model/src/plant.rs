@@ -22,9 +22,6 @@ use crate::transmission::{PulleyMotion, Transmission, TransmissionConfig};
 /// Standard gravity, m/s².
 pub const GRAVITY_M_S2: f64 = 9.80665;
 
-/// Part of a Newton step by which the play of gear and joint moves in one simulation step.
-const PLAY_RELAXATION: f64 = 0.8;
-
 /// Part of the closing speed that arm and output pulley lose when a play of the joint closes. Steel on steel keeps about
 /// half; without any loss the arm would bounce for seconds, which no bench does.
 const IMPACT_LOSS: f64 = 0.5;
@@ -400,11 +397,7 @@ impl Plant {
                 self.theta_motor_rad += delta_rad;
                 self.turn_input(config, delta_rad);
                 if play_rad > 0.0 || self.gear_offset_rad != 0.0 {
-                    let wanted = self.gear_offset_rad
-                        + PLAY_RELAXATION * self.torque_in_nm(config) / self.stiffness(config, End::Input);
-                    let offset = wanted.clamp(-0.5 * play_rad, 0.5 * play_rad);
-                    self.turn_input(config, self.gear_offset_rad - offset);
-                    self.gear_offset_rad = offset;
+                    self.gear_offset_rad = self.relax_play(config, End::Input, self.gear_offset_rad, play_rad);
                 }
                 let before = self.theta_in_rad;
                 self.theta_in_rad = self.theta_motor_rad - self.gear_offset_rad;
@@ -551,17 +544,13 @@ impl Plant {
             self.omega_out_rad_s = (self.theta_out_rad - before_rad) / dt_s;
         }
         if port.play_rad > 0.0 || self.joint_offset_rad != 0.0 {
-            // The pulley leads the arm by the offset; inside the play it carries no torque.
-            let wanted = self.joint_offset_rad
-                + PLAY_RELAXATION * self.torque_out_nm(config) / self.stiffness(config, End::Output);
+            let before = self.joint_offset_rad.abs();
+            self.joint_offset_rad = self.relax_play(config, End::Output, self.joint_offset_rad, port.play_rad);
             let half = 0.5 * port.play_rad;
-            let offset = wanted.clamp(-half, half);
-            if offset.abs() >= half && self.joint_offset_rad.abs() < half {
-                let closing_rad_s = (wanted - self.joint_offset_rad) / (PLAY_RELAXATION * dt_s);
+            if self.joint_offset_rad.abs() >= half && before < half {
+                let closing_rad_s = Self::pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
                 self.omega_out_rad_s += IMPACT_LOSS * closing_rad_s;
             }
-            self.turn_output(config, offset - self.joint_offset_rad);
-            self.joint_offset_rad = offset;
         }
     }
 
@@ -700,6 +689,13 @@ impl Plant {
         match (&self.transmission, &config.transmission) {
             (Some(state), Some(parts)) => state.stiffness_nm_per_rad(parts, end),
             _ => f64::INFINITY,
+        }
+    }
+
+    fn relax_play(&mut self, config: &PlantConfig, end: End, offset_rad: f64, play_rad: f64) -> f64 {
+        match (&mut self.transmission, &config.transmission) {
+            (Some(state), Some(parts)) => state.relax_play(parts, end, offset_rad, play_rad),
+            _ => 0.0,
         }
     }
 

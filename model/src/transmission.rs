@@ -15,8 +15,8 @@ pub const DEFAULT_ELEMENTS: usize = 16;
 /// Pull of cables a and b for a pulley that turns towards +θ, at the input end; negated at the output end.
 const CABLE_SIGN: [f64; 2] = [1.0, -1.0];
 
-/// Part of a Newton step by which a play moves in one simulation step; below 1 so that two plays in a row settle.
-const PLAY_RELAXATION: f64 = 0.8;
+/// Newton steps by which a pulley inside a play finds the place without torque, in one simulation step.
+const PLAY_STEPS: usize = 4;
 
 /// Pulleys, tendons and sheaths: configuration only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -225,15 +225,38 @@ impl Transmission {
     pub fn turn_input(&mut self, config: &TransmissionConfig, delta_rad: f64) {
         self.turn(config, End::Input, delta_rad);
         if self.play_rad > 0.0 || self.play_offset_rad != 0.0 {
-            // The pulley leads the tendons by the offset; inside the play it carries no torque, which a Newton step
-            // on the torque reaches.
-            let stiffness = self.stiffness_nm_per_rad(config, End::Input);
-            let wanted = self.play_offset_rad + PLAY_RELAXATION * self.torque_in_nm(config) / stiffness;
-            let half = 0.5 * self.play_rad;
-            let offset = wanted.clamp(-half, half);
-            self.turn(config, End::Input, self.play_offset_rad - offset);
-            self.play_offset_rad = offset;
+            self.play_offset_rad = self.relax_play(config, End::Input, self.play_offset_rad, self.play_rad);
         }
+    }
+
+    /// Lets a pulley without inertia move inside a play until the cables leave it without torque or the play ends.
+    ///
+    /// `offset_rad` is how far the driving side leads: motor or input pulley before the tendons ([`End::Input`]), output
+    /// pulley before the arm ([`End::Output`]). Returns the new lead, within ± half of `play_rad`. The first step assumes
+    /// tendons that stick next to the pulley, the stiffest they can be; they get softer as they slip, so that each step
+    /// falls short of the place and none swings across it, which would feed energy into the play.
+    pub(crate) fn relax_play(&mut self, config: &TransmissionConfig, end: End, offset_rad: f64, play_rad: f64) -> f64 {
+        let half = 0.5 * play_rad;
+        let mut offset_rad = offset_rad;
+        let mut stiffness = config.sticking_stiffness_nm_per_rad(end);
+        for _ in 0..PLAY_STEPS {
+            let torque_nm = match end {
+                End::Input => self.torque_in_nm(config),
+                End::Output => self.torque_out_nm(config),
+            };
+            let wanted = (offset_rad + torque_nm / stiffness).clamp(-half, half);
+            let moved = wanted - offset_rad;
+            if moved == 0.0 {
+                break;
+            }
+            match end {
+                End::Input => self.turn(config, End::Input, -moved),
+                End::Output => self.turn(config, End::Output, moved),
+            }
+            offset_rad = wanted;
+            stiffness = self.stiffness_nm_per_rad(config, end);
+        }
+        offset_rad
     }
 
     /// Turns the output pulley by `delta_rad`.

@@ -29,7 +29,7 @@ fn without_viscous(mut joint: JointParameters) -> JointParameters {
     joint
 }
 
-/// k (θ_in - θ) = m g l sin θ, by bisection.
+/// k (`θ_in` - θ) = m g l sin θ, by bisection.
 fn hanging_angle_rad(theta_in_rad: f64) -> f64 {
     let (mut low, mut high) = (0.0, theta_in_rad);
     for _ in 0..100 {

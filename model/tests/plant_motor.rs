@@ -35,7 +35,7 @@ fn duty(duty: f64) -> StepInput {
     StepInput { bridge: BridgeInput { duty, bus_v: 24.0, enabled: true }, ..IDLE }
 }
 
-/// Without load: ω = k V/(R b + k²), i = b ω/k with k = k_t N. A thousand time constants later only rounding is left.
+/// Without load: ω = k V/(R b + k²), i = b ω/k with k = `k_t` N. A thousand time constants later only rounding is left.
 #[test]
 fn free_run() {
     for level in [1.0, -0.3] {
@@ -133,7 +133,7 @@ fn motor_friction_holds_below_breakaway() {
     assert!(run.plant.theta_out_rad() > 0.0);
 }
 
-/// A motor-driven joint at rest under a constant duty carries the weight: k i = (r1/r2) T_out without friction.
+/// A motor-driven joint at rest under a constant duty carries the weight: k i = (r1/r2) `T_out` without friction.
 #[test]
 fn motor_carries_the_weight_through_the_cables() {
     let mut parameters = joint(0.0);
@@ -193,8 +193,8 @@ fn joint_with_distributed_friction_converges_in_time() {
     assert!(errors[1][0] < 0.02, "{errors:?} N, rad");
     assert!(errors[1][1] < 1.5e-5, "{errors:?} N, rad");
     for pair in errors.windows(2) {
-        for i in 0..2 {
-            assert!(pair[0][i] > 1.7 * pair[1][i], "not of first order: {errors:?} N, rad");
+        for (coarse, fine) in pair[0].iter().zip(pair[1]) {
+            assert!(*coarse > 1.7 * fine, "not of first order: {errors:?} N, rad");
         }
     }
 }

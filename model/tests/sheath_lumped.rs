@@ -67,7 +67,7 @@ impl Bench {
         PULLEYS.input_radius_m / PULLEYS.output_radius_m * self.theta_in_rad - self.theta_out_rad
     }
 
-    /// (r2/r1) T_in - T_out, N·m.
+    /// (r2/r1) `T_in` - `T_out`, N·m.
     fn torque_loss_nm(&self) -> f64 {
         PULLEYS.output_radius_m / PULLEYS.input_radius_m * self.state.torque_in_nm(&self.config)
             - self.state.torque_out_nm(&self.config)
@@ -124,7 +124,7 @@ fn dead_zone_without_load_is_that_of_the_paper() {
     }
 }
 
-/// At a standing output (17) is a hold of T_out. With one contact it is exact to the moment at which the slacker tendon
+/// At a standing output (17) is a hold of `T_out`. With one contact it is exact to the moment at which the slacker tendon
 /// turns; 64 contacts move the output torque earlier, because the front arrives, and reach the same (15).
 #[test]
 fn output_torque_holds_until_the_first_tendon_turns() {

@@ -78,7 +78,7 @@ impl Sensitivity {
             .par_iter()
             .filter_map(|parameter| {
                 let ends = ends_of(parameter, model)?;
-                Some(column(objective, model, parameter, ends).map(|values| (path(parameter), values)))
+                Some(column(objective, model, parameter, &ends).map(|values| (path(parameter), values)))
             })
             .collect::<Result<Vec<_>, Failure>>()?;
         Ok(Self { columns })
@@ -109,7 +109,9 @@ impl Sensitivity {
                 // The one that a recalibration moves for all of them comes first.
                 members.sort_by_key(|(name, _)| !is_recalibrated(name));
                 let unit = members[0].1;
-                members.iter_mut().for_each(|(_, exponent)| *exponent /= unit);
+                for (_, exponent) in &mut members {
+                    *exponent /= unit;
+                }
                 groups.push(Group { members });
             }
         }
@@ -166,7 +168,7 @@ fn column(
     objective: &Objective,
     model: &JointModel,
     parameter: &NominalParameter,
-    ends: Ends,
+    ends: &Ends,
 ) -> Result<Vec<f64>, Failure> {
     let at = |value: f64| {
         let mut changed = model.clone();

@@ -51,7 +51,7 @@ impl Motion {
     #[must_use]
     pub fn reference_rad(self, seconds: f64, rate_hz: f64, seed: u64) -> Vec<f64> {
         // Motions of the same seed share nothing with the sensors' noise: another stream of the generator.
-        let mut random = Random(Pcg64::new(u128::from(seed), 0x006d_6f74_696f_6e));
+        let mut random = Random(Pcg64::new(u128::from(seed), 0x6d6f_7469_6f6e));
         let samples = ((seconds * rate_hz).round() as usize).max(1);
         let parts: &[(Self, f64)] = match self {
             Self::Lab => &[
@@ -120,7 +120,7 @@ fn multisine(out: &mut [f64], rate_hz: f64, random: &mut Random) {
     let [lowest, highest] = TONES_HZ;
     let ratio = (highest / lowest).powf(1.0 / (TONES - 1) as f64);
     let tones: Vec<(f64, f64)> = (0..TONES)
-        .map(|tone| (TAU * lowest * ratio.powi(tone as i32) / rate_hz, random.between([0.0, TAU])))
+        .map(|tone| (TAU * lowest * ratio.powf(tone as f64) / rate_hz, random.between([0.0, TAU])))
         .collect();
     for (k, value) in out.iter_mut().enumerate() {
         *value = tones.iter().map(|(per_sample, phase)| (per_sample * k as f64 + phase).sin()).sum();
@@ -128,7 +128,9 @@ fn multisine(out: &mut [f64], rate_hz: f64, random: &mut Random) {
     fade(out, rate_hz);
     let peak = out.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
     let scale = AMPLITUDE_RAD * random.between([0.6, 0.95]) / peak.max(f64::MIN_POSITIVE);
-    out.iter_mut().for_each(|value| *value *= scale);
+    for value in out.iter_mut() {
+        *value *= scale;
+    }
 }
 
 fn ramps(out: &mut [f64], rate_hz: f64, random: &mut Random) {

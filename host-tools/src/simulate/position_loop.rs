@@ -113,7 +113,7 @@ impl PiD {
             integral_per_rad_s: proportional_per_rad * omega * INTEGRAL_SHARE,
             derivative_s_per_rad: (damping - decay) / per_duty,
             speed_filter_s: 1.0 / (SPEED_FILTER_RATIO * omega),
-            rad_per_count: TAU / 2.0_f64.powi(joint.sensors.encoder_bits as i32) / motor.gear_ratio,
+            rad_per_count: TAU / f64::from(joint.sensors.encoder_bits).exp2() / motor.gear_ratio,
             integral_rad_s: 0.0,
             last_rad: None,
             speed_rad_s: 0.0,

@@ -16,7 +16,7 @@ use crate::rig::Rig;
 /// Sensors of a run, in the order of its columns.
 pub(super) struct Sensors {
     parameters: SensorParameters,
-    sensors: Vec<Sensor>,
+    columns: Vec<Sensor>,
     last_s: Option<f64>,
 }
 
@@ -29,12 +29,12 @@ struct Sensor {
 impl Sensors {
     pub(super) fn new(rig: &Rig, channels: &[Channel], seed: u64) -> Self {
         // Every channel has a stream of its own, so that one more column changes no other.
-        let sensors = channels.iter().map(|channel| Sensor {
+        let columns = channels.iter().map(|channel| Sensor {
             channel: *channel,
             states: FRESH_STATES,
             noise: Pcg64::new(u128::from(seed), *channel as u128),
         });
-        Self { parameters: rig.joint.sensors, sensors: sensors.collect(), last_s: None }
+        Self { parameters: rig.joint.sensors, columns: columns.collect(), last_s: None }
     }
 
     /// Readings at `t_s`, one a column. The reference, the duty and the supply are logged, not measured.
@@ -70,13 +70,13 @@ impl Sensors {
             config.effects().measure(sensor.channel, &mut sensor.states, &mut port);
             digitised(&parameters, sensor.channel, port.value, &mut sensor.noise)
         };
-        self.sensors.iter_mut().map(read).collect()
+        self.columns.iter_mut().map(read).collect()
     }
 }
 
 /// Noise and steps of the converters. Encoders count a whole turn, tensions begin at zero.
 fn digitised(parameters: &SensorParameters, channel: Channel, value: f64, noise: &mut Pcg64) -> f64 {
-    let steps = |bits: u32| 2.0_f64.powi(bits as i32);
+    let steps = |bits: u32| f64::from(bits).exp2();
     let mut normal = |std: f64| -> f64 {
         let sample: f64 = StandardNormal.sample(noise);
         std * sample

@@ -12,7 +12,7 @@ pub const MOTOR: MotorParameters = MotorParameters {
     viscous_nm_s_per_rad: 0.02,
 };
 
-/// Torque constant at the pulley, k_t N, N·m/A.
+/// Torque constant at the pulley, `k_t` N, N·m/A.
 pub const PULLEY_NM_PER_A: f64 = 0.9;
 
 /// Rotor inertia at the pulley, J N², kg·m².

@@ -1,13 +1,10 @@
 //! What each effect of a sensor makes of a true value.
 
-#[path = "common/near.rs"]
-mod near;
-
+use crate::near::near;
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, SensorPort, Target};
 use bowden_model::effect_set::{EffectSet, FRESH_STATES};
 use bowden_model::effects::find;
-use near::near;
 
 fn set(id: &str, channel: Channel) -> EffectSet {
     let active =

@@ -1,13 +1,10 @@
 //! All effects: what they declare, that they vanish at their neutral strength, and that an inactive one is not there.
 
-#[path = "common/joint.rs"]
-mod joint;
-#[path = "common/motor.rs"]
-mod motor;
-
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::joint::{IDLE, Run, joint};
+use crate::motor::MOTOR;
 use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::{
@@ -17,8 +14,6 @@ use bowden_model::effect::{
 use bowden_model::effect_set::{EffectSet, FRESH_STATES, MAX_ACTIVE, TooManyEffects};
 use bowden_model::effects::{CATALOGUE, find};
 use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, StepInput};
-use joint::{IDLE, Run, joint};
-use motor::MOTOR;
 
 /// The fixed list of ids that a diagnosis may name, by component.
 const CONTRACT: [(Component, &str); 4] = [
@@ -117,7 +112,7 @@ fn lively_run(effects: &[ActiveEffect]) -> Run {
     parameters.motor = Some(MOTOR);
     let mut run = Run::new(parameters, effects, (InputBoundary::Motor, OutputBoundary::Arm), 5e-4);
     run.until(2.0, |t| StepInput {
-        bridge: BridgeInput { duty: 0.06 * (6.0 * t).sin(), bus_v: 24.0, enabled: true },
+        bridge: BridgeInput { duty: 0.2 * (6.0 * t).sin(), bus_v: 24.0, enabled: true },
         external_torque_nm: 0.1 * (17.0 * t).sin(),
         ..IDLE
     });

@@ -1,0 +1,132 @@
+//! Signatures of the joint's effects, in the torque (F2 - F4) r2 that the cables bring.
+
+use crate::joint::{IDLE, INERTIA_KG_M2, RADIUS_M, Run, STIFFNESS_N_PER_M, WEIGHT_NM, joint};
+use crate::near::near;
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effects::find;
+use bowden_model::plant::{GRAVITY_M_S2, InputBoundary, OutputBoundary, StepInput};
+
+/// Both cables, N·m per radian of the joint.
+const CABLES_NM_PER_RAD: f64 = 2.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M;
+
+fn run(effect: Option<&str>) -> Run {
+    let effects: Vec<ActiveEffect> =
+        effect.iter().map(|id| ActiveEffect::with_defaults(find(id).unwrap())).collect();
+    Run::new(joint(0.0), &effects, (InputBoundary::Angle, OutputBoundary::Arm), 5e-4)
+}
+
+fn at(theta_in_rad: f64) -> StepInput {
+    StepInput { theta_in_rad, ..IDLE }
+}
+
+fn torque_nm(run: &Run) -> f64 {
+    let [_, f2, _, f4] = run.tensions_n();
+    (f2 - f4) * RADIUS_M
+}
+
+/// Mean of (F2 - F4) r2 - m g l sin θ near θ = 0 in slow passes, down and up, N·m.
+fn drag_nm(effect: Option<&str>, speed_rad_s: f64) -> [f64; 2] {
+    let mut run = run(effect);
+    let leg_s = 1.0 / speed_rad_s;
+    let mut means = [0.0; 2];
+    for (leg, sign) in [(0.5, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+        let (from_s, from_rad) = (run.plant.t_s(), run.plant.theta_in_rad());
+        let (mut sum, mut count) = (0.0, 0.0);
+        while run.plant.t_s() < from_s + leg * leg_s - 1e-9 {
+            let now_s = run.plant.t_s() + 5e-4 - from_s;
+            run.plant.step(&run.config, &at(from_rad + sign * speed_rad_s * now_s), 5e-4);
+            if run.plant.theta_out_rad().abs() < 0.1 {
+                sum += torque_nm(&run) - WEIGHT_NM * run.plant.theta_out_rad().sin();
+                count += 1.0;
+            }
+        }
+        means[usize::from(sign > 0.0)] = sum / count;
+    }
+    means
+}
+
+/// Dry friction of 0.05 N·m: F2 - F4 jumps by 2 τ/r2 = 6.67 N between the directions, the same at every speed.
+#[test]
+fn coulomb_friction_is_a_jump_at_reversal() {
+    for speed in [0.25, 0.5] {
+        let [down, up] = drag_nm(Some("joint_coulomb_friction"), speed);
+        let [plain_down, plain_up] = drag_nm(None, speed);
+        near("up", up - plain_up, 0.05, 1e-4);
+        near("down", down - plain_down, -0.05, 1e-4);
+    }
+}
+
+/// Added viscous friction of 0.05 N·m·s/rad: in proportion to the speed, which stretch makes 1.3 % slower.
+#[test]
+fn viscous_friction_grows_with_speed() {
+    for speed in [0.25, 0.5] {
+        let [down, up] = drag_nm(Some("joint_viscous_friction"), speed);
+        let [plain_down, plain_up] = drag_nm(None, speed);
+        let slowed = 1.0 - WEIGHT_NM / CABLES_NM_PER_RAD;
+        near("up", up - plain_up, 0.05 * speed * slowed, 2e-4);
+        near("down", down - plain_down, -0.05 * speed * slowed, 2e-4);
+    }
+}
+
+/// The weight pulls the arm through half the play on either side: at rest it hangs 10 mrad lower than without, and the
+/// cables carry it all the same.
+#[test]
+fn backlash_drops_the_arm_by_half_the_gap() {
+    for side in [1.0, -1.0] {
+        let mut loose = run(Some("joint_backlash"));
+        loose.until(4.0, |t| at(side * 0.4 * t.min(1.0)));
+        let theta = loose.plant.theta_out_rad();
+        near("carried", torque_nm(&loose), WEIGHT_NM * theta.sin(), 1e-6);
+        let stretch_rad = torque_nm(&loose) / CABLES_NM_PER_RAD;
+        near("angle", side * 0.4 - stretch_rad - theta, side * 0.01, 1e-6);
+    }
+}
+
+/// Static torque: weight, and the spring of 0.3 N·m/rad, the stop of 20 N·m/rad from 0.5 rad on, the added 0.5 kg after
+/// 10 s.
+#[test]
+fn static_torque_shows_spring_stop_and_payload() {
+    for (id, theta_in_rad) in
+        [("joint_spring", 0.4), ("joint_spring", -0.4), ("end_stop_contact", 0.45), ("end_stop_contact", 0.8)]
+    {
+        let mut run = run(Some(id));
+        run.until(6.0, |t| at(theta_in_rad * t.min(1.0)));
+        let theta = run.plant.theta_out_rad();
+        let added_nm = if id == "joint_spring" { 0.3 * theta } else { 20.0 * (theta - 0.5).max(0.0) };
+        assert!(added_nm != 0.0 || theta < 0.5);
+        near(id, torque_nm(&run), WEIGHT_NM * theta.sin() + added_nm, 1e-6);
+    }
+    let mut run = run(Some("payload_change"));
+    for (until_s, mass_kg) in [(9.9, 1.5), (16.0, 2.0)] {
+        run.until(until_s, |t| at(0.4 * t.min(1.0)));
+        let theta = run.plant.theta_out_rad();
+        near("payload", torque_nm(&run), mass_kg * GRAVITY_M_S2 * 0.03 * theta.sin(), 1e-6);
+    }
+}
+
+/// Added mass slows the ring: ω² I is the same stiffness, so the frequency falls with the root of the inertia.
+#[test]
+fn payload_slows_the_ring() {
+    let cycles = |effects: &[ActiveEffect]| -> f64 {
+        let mut run = Run::new(joint(0.0), effects, (InputBoundary::Angle, OutputBoundary::Arm), 1e-4);
+        run.until(0.1, |_| at(0.0));
+        run.plant.set_speed_rad_s(0.1);
+        let mut times = Vec::new();
+        while times.len() < 9 {
+            let before = run.plant.theta_out_rad();
+            run.plant.step(&run.config, &at(0.0), 1e-4);
+            let now = run.plant.theta_out_rad();
+            if before * now < 0.0 {
+                times.push(run.plant.t_s() - now / run.plant.omega_out_rad_s());
+            }
+        }
+        4.0 / (times[8] - times[0])
+    };
+    let heavier = ActiveEffect::with_defaults(find("payload_change").unwrap()).with("time_s", 0.0);
+    let ratio = cycles(&[heavier]) / cycles(&[]);
+    // The weight's own stiffness m g l is 1.3 % of the cables', the damping changes the frequency by 0.1 %.
+    let cables = CABLES_NM_PER_RAD;
+    let inertia = INERTIA_KG_M2 * 2.0 / 1.5;
+    let want = ((cables + WEIGHT_NM * 2.0 / 1.5) / inertia / ((cables + WEIGHT_NM) / INERTIA_KG_M2)).sqrt();
+    near("frequency", ratio, want, 1e-3);
+}

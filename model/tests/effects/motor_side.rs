@@ -1,0 +1,157 @@
+//! Signatures of the motor's effects.
+
+use crate::joint::{IDLE, RADIUS_M, Run, joint};
+use crate::motor::{MOTOR, PULLEY_INERTIA_KG_M2, PULLEY_NM_PER_A};
+use crate::near::near;
+use bowden_model::drive::BridgeInput;
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effects::find;
+use bowden_model::parameters::JointParameters;
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, StepInput};
+
+fn effect(id: &str) -> ActiveEffect {
+    ActiveEffect::with_defaults(find(id).unwrap())
+}
+
+fn duty(duty: f64) -> StepInput {
+    StepInput { bridge: BridgeInput { duty, bus_v: 24.0, enabled: true }, ..IDLE }
+}
+
+/// Motor alone on its pulley.
+fn free_motor(effects: &[ActiveEffect], dt_s: f64) -> Run {
+    let parameters = JointParameters {
+        motor: Some(MOTOR),
+        pulleys: None,
+        tendon: None,
+        sheath: None,
+        load: None,
+        ..joint(0.0)
+    };
+    Run::new(parameters, effects, (InputBoundary::Motor, OutputBoundary::Arm), dt_s)
+}
+
+/// Steady speed at a duty: k (V d - k ω)/R = b ω + τ.
+fn steady_speed(duty: f64, viscous: f64, dry_nm: f64) -> f64 {
+    (PULLEY_NM_PER_A * 24.0 * duty / 2.0 - dry_nm) / (viscous + PULLEY_NM_PER_A * PULLEY_NM_PER_A / 2.0)
+}
+
+/// Friction of every kind by the speed that is left.
+#[test]
+fn friction_costs_speed() {
+    for (id, level, viscous, dry_nm) in [
+        ("motor_coulomb_friction", 0.3, 0.02, 0.08),
+        ("motor_viscous_friction", 0.3, 0.07, 0.0),
+        // Seven times the speed of 0.2 rad/s and more: only the 0.04 N·m at speed are left.
+        ("motor_stribeck_friction", 0.1, 0.02, 0.04),
+        ("drive_dead_zone", 0.3, 0.02, PULLEY_NM_PER_A * 24.0 * 0.03 / 2.0),
+    ] {
+        let mut run = free_motor(&[effect(id)], 5e-4);
+        run.until(5.0, |_| duty(level));
+        near(id, run.plant.omega_out_rad_s(), steady_speed(level, viscous, dry_nm), 1e-6);
+    }
+}
+
+/// Breakaway: the duty at which 0.08, 0.08 + 0.04 N·m are reached, and the 3 % below which the drive is dead.
+#[test]
+fn standstill_below_breakaway() {
+    for (id, level) in [
+        ("motor_coulomb_friction", 0.08 * 2.0 / (PULLEY_NM_PER_A * 24.0)),
+        ("motor_stribeck_friction", 0.12 * 2.0 / (PULLEY_NM_PER_A * 24.0)),
+        ("drive_dead_zone", 0.03),
+    ] {
+        for sign in [1.0, -1.0] {
+            let mut run = free_motor(&[effect(id)], 5e-4);
+            run.until(1.0, |_| duty(sign * 0.999 * level));
+            assert_eq!(run.plant.theta_motor_rad(), 0.0, "{id}");
+            run.until(2.0, |_| duty(sign * 1.01 * level));
+            assert!(sign * run.plant.theta_motor_rad() > 1e-4, "{id}: {}", run.plant.theta_motor_rad());
+        }
+    }
+}
+
+/// A weight on frictionless cables: the motor must exceed it by c = 10 % before it rises and fall 10 % short before it
+/// sinks. Ramps of 1 %/s, breakaway seen within 1 %.
+#[test]
+fn gear_friction_grows_with_the_load() {
+    for (sign, want) in [(1.0, 1.1), (-1.0, 0.9)] {
+        let mut parameters = joint(0.0);
+        parameters.motor = Some(MOTOR);
+        let boundaries = (InputBoundary::Motor, OutputBoundary::Arm);
+        let mut run = Run::new(parameters, &[effect("gear_load_friction")], boundaries, 5e-4);
+        run.plant = Plant::at_rest(&run.config, 0.6, 0.6);
+        run.plant.settle(&run.config, &IDLE);
+        let carried_nm = run.plant.torque_in_nm(&run.config);
+        let level = carried_nm * 2.0 / (PULLEY_NM_PER_A * 24.0);
+        // Full current from the first step: the winding takes 0.5 ms, the gear holds that long with the rotor's inertia.
+        run.until(0.05, |_| duty(level));
+        let rest_rad = run.plant.theta_motor_rad();
+        let start_s = run.plant.t_s();
+        while (run.plant.theta_motor_rad() - rest_rad).abs() < 2e-5 {
+            let change = 1.0 + sign * 0.01 * (run.plant.t_s() - start_s);
+            run.plant.step(&run.config, &duty(level * change), 5e-4);
+            assert!(run.plant.t_s() < 20.0);
+        }
+        let torque_nm = PULLEY_NM_PER_A * run.plant.current_a();
+        near("breakaway over weight", torque_nm / carried_nm, want, 0.01);
+    }
+}
+
+/// Pushed to either side against a held joint, rotor and pulley come to stand half the 20 mrad apart.
+#[test]
+fn backlash_lets_the_rotor_turn_alone() {
+    let mut parameters = joint(0.0);
+    parameters.motor = Some(MOTOR);
+    let boundaries = (InputBoundary::Motor, OutputBoundary::Angle);
+    let mut run = Run::new(parameters, &[effect("gear_backlash")], boundaries, 5e-4);
+    for sign in [1.0, -1.0, 1.0] {
+        let until_s = run.plant.t_s() + 2.0;
+        run.until(until_s, |_| duty(sign * 0.02));
+        let lead_rad = run.plant.theta_motor_rad() - run.plant.theta_in_rad();
+        near("lead of the rotor", lead_rad, sign * 0.01, 1e-9);
+        // The cables carry k V d/R all the same.
+        let torque_nm = run.plant.torque_in_nm(&run.config);
+        near("torque", torque_nm, sign * PULLEY_NM_PER_A * 24.0 * 0.02 / 2.0, 1e-6);
+        assert!(torque_nm.abs() > 100.0 * RADIUS_M * 0.1);
+    }
+}
+
+/// At a mean speed Ω the ripple A sin(nΩt) meets the rotor's inertia, its damping and the winding: amplitude of the speed
+/// A/|jnΩ I + b + k²/(R + jnΩ L)|. Linear in A, which the 0.5 % of speed ripple justify; 1 % for the explicit step.
+#[test]
+fn cogging_ripples_the_speed() {
+    let mut run = free_motor(&[effect("motor_cogging")], 2e-5);
+    run.until(2.0, |_| duty(0.4));
+    let (mut low, mut high, mut sum) = (f64::MAX, f64::MIN, 0.0);
+    for _ in 0..20_000 {
+        run.plant.step(&run.config, &duty(0.4), 2e-5);
+        let omega = run.plant.omega_out_rad_s();
+        (low, high, sum) = (low.min(omega), high.max(omega), sum + omega);
+    }
+    let ripple_rad_s = 40.0 * sum / 20_000.0;
+    let electric = PULLEY_NM_PER_A * PULLEY_NM_PER_A / (4.0 + (ripple_rad_s * 1e-3).powi(2));
+    let real = 0.02 + electric * 2.0;
+    let imaginary = ripple_rad_s * PULLEY_INERTIA_KG_M2 - electric * ripple_rad_s * 1e-3;
+    near("ripple", 0.5 * (high - low) / (0.1 / real.hypot(imaginary)), 1.0, 0.01);
+}
+
+/// A blocked motor at V settles where R = `R_0` (1 + g V²/R), and gets there with the time constant, here 0.5 s.
+#[test]
+fn winding_heats_up() {
+    let hot = effect("winding_heating").with("time_constant_s", 0.5);
+    let parameters = JointParameters {
+        motor: Some(MOTOR),
+        pulleys: None,
+        tendon: None,
+        sheath: None,
+        load: None,
+        ..joint(0.0)
+    };
+    let mut run = Run::new(parameters, &[hot], (InputBoundary::Angle, OutputBoundary::Arm), 5e-4);
+    run.until(0.05, |_| duty(0.2));
+    // After a tenth of the time constant the resistance has risen by at most g i² R t/τ = 0.05 · 11.52 · 0.1 of itself.
+    let early = run.plant.current_a() / 2.4;
+    assert!((0.94..0.96).contains(&early), "{early} of the cold current");
+    run.until(15.0, |_| duty(0.2));
+    let resistance_ohm = 1.0 + (1.0 + 2.0 * 0.05 * 4.8_f64.powi(2)).sqrt();
+    near("current", run.plant.current_a(), 4.8 / resistance_ohm, 1e-6);
+}
