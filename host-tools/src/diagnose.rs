@@ -82,7 +82,8 @@ pub fn diagnose(
     heldout: &[Recording],
     progress: &dyn Progress,
 ) -> Result<Diagnosed, Failure> {
-    let first = training.first().ok_or_else(|| Failure::bad_input("no recording to diagnose; name at least one"))?;
+    let first =
+        training.first().ok_or_else(|| Failure::bad_input("no recording to diagnose; name at least one"))?;
     let model = JointModel::from_rig(rig, first)?;
     let objective = Objective::new(&model, training, heldout, heldout.is_empty())?;
     let search = JointModel {
@@ -96,7 +97,17 @@ pub fn diagnose(
     let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
     let after = objective.predict(&last.model)?;
     let stages = Stages { before, recalibrated, after };
-    Ok(report(rig, &objective, &model, &selected, &last, &stages, training, heldout))
+    Ok(Case { rig, training, heldout, objective: &objective, model: &model }
+        .report(&selected, &last, &stages))
+}
+
+/// What a diagnosis is about.
+struct Case<'a> {
+    rig: &'a Rig,
+    training: &'a [Recording],
+    heldout: &'a [Recording],
+    objective: &'a Objective,
+    model: &'a JointModel,
 }
 
 /// Predictions at the three stages of a diagnosis.
@@ -126,103 +137,108 @@ fn refine(
     solve_in_rounds(objective, &start, &free, FINAL_PATIENCE, &[FINE_STEP])
 }
 
-#[allow(clippy::too_many_arguments)]
-fn report(
-    rig: &Rig,
-    objective: &Objective,
-    model: &JointModel,
-    selected: &Selected,
-    last: &Solution,
-    stages: &Stages,
-    training: &[Recording],
-    heldout: &[Recording],
-) -> Diagnosed {
-    let nominal = recalibrated(model);
-    let recalibrated_parameters: Vec<Recalibrated> = nominal
-        .iter()
-        .zip(&last.values)
-        .zip(&last.stds)
-        .map(|((free, value), std)| Recalibrated {
-            parameter: free.path(model),
-            nominal: free.start(),
-            fitted: *value,
-            std: *std,
-            unit: free.spec().unit.to_owned(),
-            at_bound: free.at_bound(*value),
-        })
-        .collect();
-    let own = model.effects.len();
-    let mut first_value = nominal.len();
-    let mut effects = Vec::new();
-    for (index, chosen) in selected.chosen.iter().enumerate() {
-        let active = last.model.effects[own + index];
-        let count = active.descriptor().parameters.len();
-        let values = first_value..first_value + count;
-        effects.push(named(active, chosen, &last.stds[values], objective));
-        first_value += count;
-    }
-    effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let left = objective.compare(&stages.after);
-    let unexplained = unexplained::unexplained(objective, model, &left);
-    let wrong = recalibrated_parameters.iter().any(|p| (p.fitted / p.nominal - 1.0).abs() > WRONG_PARAMETER);
-    let loss_before = objective.mean_loss(&objective.compare(&stages.before), Part::HeldOut);
-    let loss_recalibrated = objective.mean_loss(&objective.compare(&stages.recalibrated), Part::HeldOut);
-    let verdict = match (&effects[..], &unexplained) {
-        ([_, ..], _) => Verdict::MissingPhysics,
-        ([], Some(_)) => Verdict::Unexplained,
-        ([], None) if wrong && selection::worthwhile(loss_before, loss_recalibrated) => Verdict::Recalibrate,
-        ([], None) => Verdict::Consistent,
-    };
-    let channels: BTreeMap<String, ChannelFit> = objective
-        .scales()
-        .iter()
-        .map(|(series, _)| {
-            let rmse = |predictions: &[Prediction]| objective.rmse(predictions, *series, Part::HeldOut);
-            let fit = ChannelFit {
-                before_rmse: rmse(&stages.before),
-                recalibrated_rmse: rmse(&stages.recalibrated),
-                after_rmse: rmse(&stages.after),
-                noise_rmse: objective.noise_variance(*series).sqrt(),
-            };
-            (series.name().to_owned(), fit)
-        })
-        .collect();
-    let loss_after = objective.mean_loss(&left, Part::HeldOut);
-    let diagnosis = Diagnosis {
-        schema: SCHEMA.to_owned(),
-        verdict,
-        summary: words::summary(verdict, &effects, &recalibrated_parameters, loss_recalibrated, loss_after),
-        effects,
-        recalibrated: recalibrated_parameters,
-        indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model).unwrap_or_default(),
-        mismatch: place::mismatch(objective, &objective.compare(&stages.recalibrated)),
-        unexplained,
-        fit: Fit { heldout: true, channels },
-        rig: rig.name.clone(),
-        recordings: training.iter().map(|r| r.source().to_owned()).collect(),
-        heldout: if heldout.is_empty() {
-            vec!["every third second of each recording".to_owned()]
-        } else {
-            heldout.iter().map(|r| r.source().to_owned()).collect()
-        },
-        written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
-    };
-    let parameters = nominal
-        .iter()
-        .zip(&last.values)
-        .filter_map(|(free, value)| match free.place() {
-            crate::fit::free::Place::Nominal(parameter) => Some((parameter.section, parameter.spec.name, *value)),
-            crate::fit::free::Place::Effect { .. } => None,
-        })
-        .collect();
-    Diagnosed {
-        findings: Findings {
-            diagnosis,
-            traces: traces(objective, stages),
-            regimes: place::regimes(objective, stages),
-        },
-        parameters,
-        effects: last.model.effects[own..].to_vec(),
+impl Case<'_> {
+    fn report(&self, selected: &Selected, last: &Solution, stages: &Stages) -> Diagnosed {
+        let Self { rig, training, heldout, objective, model } = *self;
+        let nominal = recalibrated(model);
+        let recalibrated_parameters: Vec<Recalibrated> = nominal
+            .iter()
+            .zip(&last.values)
+            .zip(&last.stds)
+            .map(|((free, value), std)| Recalibrated {
+                parameter: free.path(model),
+                nominal: free.start(),
+                fitted: *value,
+                std: *std,
+                unit: free.spec().unit.to_owned(),
+                at_bound: free.at_bound(*value),
+            })
+            .collect();
+        let own = model.effects.len();
+        let mut first_value = nominal.len();
+        let mut effects = Vec::new();
+        for (index, chosen) in selected.chosen.iter().enumerate() {
+            let active = last.model.effects[own + index];
+            let count = active.descriptor().parameters.len();
+            let values = first_value..first_value + count;
+            effects.push(named(active, chosen, &last.stds[values], objective));
+            first_value += count;
+        }
+        effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let left = objective.compare(&stages.after);
+        let unexplained = unexplained::unexplained(objective, model, &left);
+        let wrong =
+            recalibrated_parameters.iter().any(|p| (p.fitted / p.nominal - 1.0).abs() > WRONG_PARAMETER);
+        let loss_before = objective.mean_loss(&objective.compare(&stages.before), Part::HeldOut);
+        let loss_recalibrated = objective.mean_loss(&objective.compare(&stages.recalibrated), Part::HeldOut);
+        let verdict = match (&effects[..], &unexplained) {
+            ([_, ..], _) => Verdict::MissingPhysics,
+            ([], Some(_)) => Verdict::Unexplained,
+            ([], None) if wrong && selection::worthwhile(loss_before, loss_recalibrated) => {
+                Verdict::Recalibrate
+            }
+            ([], None) => Verdict::Consistent,
+        };
+        let channels: BTreeMap<String, ChannelFit> = objective
+            .scales()
+            .iter()
+            .map(|(series, _)| {
+                let rmse = |predictions: &[Prediction]| objective.rmse(predictions, *series, Part::HeldOut);
+                let fit = ChannelFit {
+                    before_rmse: rmse(&stages.before),
+                    recalibrated_rmse: rmse(&stages.recalibrated),
+                    after_rmse: rmse(&stages.after),
+                    noise_rmse: objective.noise_variance(*series).sqrt(),
+                };
+                (series.name().to_owned(), fit)
+            })
+            .collect();
+        let loss_after = objective.mean_loss(&left, Part::HeldOut);
+        let diagnosis = Diagnosis {
+            schema: SCHEMA.to_owned(),
+            verdict,
+            summary: words::summary(
+                verdict,
+                &effects,
+                &recalibrated_parameters,
+                loss_recalibrated,
+                loss_after,
+            ),
+            effects,
+            recalibrated: recalibrated_parameters,
+            indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model)
+                .unwrap_or_default(),
+            mismatch: place::mismatch(objective, &objective.compare(&stages.recalibrated)),
+            unexplained,
+            fit: Fit { heldout: true, channels },
+            rig: rig.name.clone(),
+            recordings: training.iter().map(|r| r.source().to_owned()).collect(),
+            heldout: if heldout.is_empty() {
+                vec!["every third second of each recording".to_owned()]
+            } else {
+                heldout.iter().map(|r| r.source().to_owned()).collect()
+            },
+            written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
+        };
+        let parameters = nominal
+            .iter()
+            .zip(&last.values)
+            .filter_map(|(free, value)| match free.place() {
+                crate::fit::free::Place::Nominal(parameter) => {
+                    Some((parameter.section, parameter.spec.name, *value))
+                }
+                crate::fit::free::Place::Effect { .. } => None,
+            })
+            .collect();
+        Diagnosed {
+            findings: Findings {
+                diagnosis,
+                traces: traces(objective, stages),
+                regimes: place::regimes(objective, stages),
+            },
+            parameters,
+            effects: last.model.effects[own..].to_vec(),
+        }
     }
 }
 

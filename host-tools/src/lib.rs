@@ -10,6 +10,7 @@ pub mod recording;
 pub mod rig;
 pub mod fit;
 pub mod joint_model;
+pub mod marks;
 pub mod reconstruct;
 pub mod replay;
 pub mod simulate;

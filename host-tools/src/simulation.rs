@@ -170,15 +170,16 @@ pub fn replay(model: &JointModel, input: &ReplayInput) -> Result<Prediction, Fai
     let run = Run { model, config: &config, input, drive };
     if drive == Drive::GuidedMotor {
         let no_torque = vec![0.0; input.t_s.len()];
-        let first = run.execute(Guide { stiffness_nm_per_rad: STIFF_GUIDE_NM_PER_RAD, ahead_nm: &no_torque });
+        let first = run.execute(Guide { stiffness_nm_per_rad: STIFF_GUIDE_NM_PER_RAD, ahead_nm: &no_torque }, &[]);
         let mut ahead_nm = first.guide_nm;
         let half = (GUIDE_FILTER_S / median_step_s(&input.t_s)).round() as usize;
         for _ in 0..2 {
             ahead_nm = moving_average(&ahead_nm, half);
         }
-        return Ok(run.execute(Guide { stiffness_nm_per_rad: SOFT_GUIDE_NM_PER_RAD, ahead_nm: &ahead_nm }));
+        let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE_NM_PER_RAD, ahead_nm: &ahead_nm };
+        return Ok(run.execute(guide, &model.outputs));
     }
-    Ok(run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }))
+    Ok(run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }, &model.outputs))
 }
 
 fn median_step_s(t_s: &[f64]) -> f64 {
@@ -204,7 +205,8 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn execute(&self, guide: Guide<'_>) -> Prediction {
+    /// One pass; only `outputs` are sampled.
+    fn execute(&self, guide: Guide<'_>, outputs: &[Channel]) -> Prediction {
         let input = self.input;
         let n = input.t_s.len();
         let longest_s = self.model.step_s.min(self.config.stable_step_s());
@@ -217,9 +219,10 @@ impl Run<'_> {
             plant.set_speed_rad_s(input.start_rad_s);
         }
         plant.settle(self.config, &self.step_input(0, start_rad));
-        let mut sampler = Sampler::new(self.model, effects, n);
+        let mut sampler = Sampler::new(outputs, effects, n);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut guide_nm = Vec::with_capacity(if self.drive == Drive::GuidedMotor { n } else { 0 });
+        let mut duty = 0.0;
         for k in 0..n {
             let mut torque_sum = 0.0;
             if k > 0 {
@@ -248,13 +251,15 @@ impl Run<'_> {
                         }
                         Drive::Angle | Drive::Duty => {}
                     }
+                    duty = step.bridge.duty;
                     plant.step(self.config, &step, dt_s);
                 }
             }
             if self.drive == Drive::GuidedMotor {
                 guide_nm.push(torque_sum);
             }
-            sampler.sample(self.config, &plant, input.t_s[k], if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] });
+            let since_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
+            sampler.sample(self.config, &plant, duty, (input.t_s[k], since_s));
         }
         Prediction { channels: sampler.channels, guide_nm }
     }
@@ -318,13 +323,13 @@ struct Sampler<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    fn new(model: &JointModel, effects: &'a EffectSet, samples: usize) -> Self {
-        let channels: Vec<_> = model.outputs.iter().map(|c| (*c, Vec::with_capacity(samples))).collect();
+    fn new(outputs: &[Channel], effects: &'a EffectSet, samples: usize) -> Self {
+        let channels: Vec<_> = outputs.iter().map(|c| (*c, Vec::with_capacity(samples))).collect();
         let states = vec![FRESH_STATES; channels.len()];
         Self { effects, channels, states }
     }
 
-    fn sample(&mut self, config: &PlantConfig, plant: &Plant, t_s: f64, dt_s: f64) {
+    fn sample(&mut self, config: &PlantConfig, plant: &Plant, duty: f64, (t_s, dt_s): (f64, f64)) {
         let [f1, f2, f3, f4] = plant.end_tensions_n(config);
         for ((channel, values), states) in self.channels.iter_mut().zip(&mut self.states) {
             let value = match channel {
@@ -338,7 +343,9 @@ impl<'a> Sampler<'a> {
                 Channel::TorqueIn => plant.driving_torque_nm(config),
                 Channel::TorqueOut => plant.torque_out_nm(config),
                 Channel::MotorCurrent => plant.current_a(),
-                Channel::ThetaRef | Channel::Duty | Channel::BusVoltage | Channel::DriveEnable => 0.0,
+                Channel::Duty => duty,
+                // Never predicted: they come from outside the joint.
+                Channel::ThetaRef | Channel::BusVoltage | Channel::DriveEnable => 0.0,
             };
             let mut port = SensorPort { t_s, dt_s, value };
             self.effects.measure(*channel, states, &mut port);

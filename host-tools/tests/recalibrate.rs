@@ -1,5 +1,6 @@
 //! A fit on recordings of the model itself, whose parameters are known: what comes back, and what cannot.
 
+use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -12,6 +13,7 @@ use bowden::progress::Quiet;
 use bowden::recording::Recording;
 use bowden::rig::Rig;
 use bowden::simulate::{Motion, Reference, RunOptions, run};
+use bowden_model::channel::Channel::{BusVoltage, Duty, ThetaIn};
 use bowden_model::parameters::nominal;
 
 const RIG: &str = r#"schema = "bowden-rig/1"
@@ -151,9 +153,7 @@ fn a_replay_reads_nothing_but_time_and_inputs() {
     // The same inputs beside tensions that cannot be read at all.
     let mut inputs = String::from("f1_n,t_s,theta_in_rad,duty,bus_v\n");
     let column = |channel| recording.channel(channel).unwrap();
-    use bowden_model::channel::Channel::{BusVoltage, Duty, ThetaIn};
     for k in 0..recording.len() {
-        use std::fmt::Write;
         let (t, theta, duty, bus) =
             (recording.t_s()[k], column(ThetaIn)[k], column(Duty)[k], column(BusVoltage)[k]);
         writeln!(inputs, "broken,{t:?},{theta:?},{duty:?},{bus:?}").unwrap();

@@ -320,7 +320,14 @@ impl Tendon {
     ///
     /// With `unilateral` the end tension stops at zero and the tendon goes slack instead of pushing; without it the
     /// tension may become negative, and a part that pushes carries no friction.
-    pub fn move_end(&mut self, mesh: &TendonMesh, limits: &SlipLimits, end: End, pull_m: f64, unilateral: bool) {
+    pub fn move_end(
+        &mut self,
+        mesh: &TendonMesh,
+        limits: &SlipLimits,
+        end: End,
+        pull_m: f64,
+        unilateral: bool,
+    ) {
         if self.slide(mesh, limits, end, pull_m) {
             return;
         }

@@ -32,12 +32,15 @@ pub fn candidates(model: &JointModel, objective: &Objective, predictions: &[Pred
     let mut found = Vec::new();
     for effect in CATALOGUE {
         let descriptor = effect.descriptor();
-        if !fits(model, descriptor.component) {
+        // On a rig whose friction is distributed already, an effect that distributes it changes nothing.
+        let redundant = effect.friction_law() == Some(model.parameters.friction);
+        if redundant || !fits(model, descriptor.component) {
             continue;
         }
         for target in targets(model, descriptor) {
             let contained = model.effects.iter().any(|active| {
-                active.descriptor().id == descriptor.id && (target == Target::None || overlaps(active.target, target))
+                active.descriptor().id == descriptor.id
+                    && (target == Target::None || overlaps(active.target, target))
             });
             if contained {
                 continue;
@@ -75,7 +78,8 @@ fn targets(model: &JointModel, descriptor: &Descriptor) -> Vec<Target> {
     };
     let mut targets: Vec<Target> =
         descriptor.channels.iter().filter(|c| simulated(c)).map(|c| Target::One(*c)).collect();
-    let all_tensions = Channel::TENSIONS.iter().all(|c| descriptor.channels.contains(c) && model.outputs.contains(c));
+    let all_tensions =
+        Channel::TENSIONS.iter().all(|c| descriptor.channels.contains(c) && model.outputs.contains(c));
     if all_tensions && descriptor.id == "sensor_lag" {
         targets.push(Target::Tensions);
     }
@@ -99,15 +103,17 @@ fn starts(
         "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
         "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
         "end_stop_contact" => end_stop_starts(base, model, objective),
-        "encoder_eccentricity" => {
-            (0..4).map(|quarter| base.with("phase_rad", f64::from(quarter) * TAU / 4.0 - TAU / 2.0 + 0.01)).collect()
-        }
+        "encoder_eccentricity" => (0..4)
+            .map(|quarter| base.with("phase_rad", f64::from(quarter) * TAU / 4.0 - TAU / 2.0 + 0.01))
+            .collect(),
         "sensor_gain_error" => [0.92, 1.08].map(|gain| base.with("gain", gain)).to_vec(),
         "sensor_lag" => [0.01, 0.05].map(|lag| base.with("time_constant_s", lag)).to_vec(),
         _ => {
             let Some(strength) = strength else { return vec![base] };
-            let values: Vec<f64> =
-                [0.4, 1.0, 2.5].iter().flat_map(|factor| both_signs(from_neutral(base, strength.default, *factor))).collect();
+            let values: Vec<f64> = [0.4, 1.0, 2.5]
+                .iter()
+                .flat_map(|factor| both_signs(from_neutral(base, strength.default, *factor)))
+                .collect();
             let with_strength = |start: &ActiveEffect, value: f64| {
                 start.with(strength.name, value.clamp(strength.lower, strength.upper))
             };
@@ -118,7 +124,9 @@ fn starts(
                         let at = base
                             .with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
                             .with("duration_s", duration_s / 6.0);
-                        both_signs(strength.default).into_iter().map(move |value| at.with(strength.name, value))
+                        both_signs(strength.default)
+                            .into_iter()
+                            .map(move |value| at.with(strength.name, value))
                     })
                     .collect(),
                 None => values.into_iter().map(|value| with_strength(&base, value)).collect(),
@@ -134,7 +142,11 @@ fn from_neutral(base: ActiveEffect, default: f64, factor: f64) -> f64 {
 }
 
 /// Amplitude, period and phase from the torque that guided the motor, by least squares over every whole period.
-fn cogging_start(base: ActiveEffect, objective: &Objective, predictions: &[Prediction]) -> Option<ActiveEffect> {
+fn cogging_start(
+    base: ActiveEffect,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Option<ActiveEffect> {
     let mut best: Option<(f64, ActiveEffect)> = None;
     for periods in COGGING_PERIODS {
         let n = periods as f64;
@@ -161,7 +173,10 @@ fn cogging_start(base: ActiveEffect, objective: &Objective, predictions: &[Predi
         let (a, b) = ((sg * cc - cg * sc) / determinant, (cg * ss - sg * sc) / determinant);
         let gain = a * sg + b * cg;
         if best.as_ref().is_none_or(|(most, _)| gain > *most) {
-            let start = base.with("amplitude_nm", a.hypot(b)).with("cycles_per_turn", n).with("phase_rad", b.atan2(a));
+            let start = base
+                .with("amplitude_nm", a.hypot(b))
+                .with("cycles_per_turn", n)
+                .with("phase_rad", b.atan2(a));
             best = Some((gain, start));
         }
     }
@@ -169,7 +184,11 @@ fn cogging_start(base: ActiveEffect, objective: &Objective, predictions: &[Predi
 }
 
 /// Offset from the mean difference of the channel.
-fn offset_start(base: ActiveEffect, objective: &Objective, predictions: &[Prediction]) -> Option<ActiveEffect> {
+fn offset_start(
+    base: ActiveEffect,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Option<ActiveEffect> {
     let Target::One(channel) = base.target else { return None };
     let (mut sum, mut count) = (0.0, 0.0);
     for (recording, prediction) in predictions.iter().enumerate() {
@@ -195,7 +214,8 @@ fn saturation_start(base: ActiveEffect, objective: &Objective) -> Option<ActiveE
 
 /// Stops at nine tenths and seven tenths of the travel, on both sides.
 fn end_stop_starts(base: ActiveEffect, model: &JointModel, objective: &Objective) -> Vec<ActiveEffect> {
-    let channel = if model.outputs.contains(&Channel::ThetaOut) { Channel::ThetaOut } else { Channel::ThetaIn };
+    let channel =
+        if model.outputs.contains(&Channel::ThetaOut) { Channel::ThetaOut } else { Channel::ThetaIn };
     let travel: Vec<f64> = (0..objective.recordings())
         .filter_map(|recording| objective.measured(recording, Series::Channel(channel)))
         .flatten()

@@ -103,32 +103,44 @@ pub(crate) fn regimes_of(objective: &Objective, recording: usize) -> Vec<Regime>
         .collect()
 }
 
+/// Loss of one block and when it happened.
+struct Blame {
+    loss: f64,
+    t_start_s: f64,
+    t_end_s: f64,
+}
+
 /// Shares of the loss by channel and regime, largest first.
 pub(crate) fn mismatch(objective: &Objective, residuals: &Residuals) -> Vec<Mismatch> {
     let regimes: Vec<Vec<Regime>> = (0..objective.recordings()).map(|r| regimes_of(objective, r)).collect();
-    let entries: Vec<(Entry, f64)> = objective.entries().zip(residuals.values.iter().map(|v| loss(*v))).collect();
+    let entries: Vec<(Entry, f64)> =
+        objective.entries().zip(residuals.values.iter().map(|v| loss(*v))).collect();
     let total: f64 = entries.iter().map(|(_, loss)| loss).sum();
-    let mut places: BTreeMap<(Series, Regime), Vec<(f64, f64, f64)>> = BTreeMap::new();
+    let mut places: BTreeMap<(Series, Regime), Vec<Blame>> = BTreeMap::new();
     for (entry, loss) in entries {
         let t_s = objective.input(entry.recording).t_s();
         let middle = usize::midpoint(entry.block.start, entry.block.end);
         let regime = regimes[entry.recording][middle];
         let Block { start, end, .. } = entry.block;
-        places.entry((entry.series, regime)).or_default().push((loss, t_s[start], t_s[end - 1]));
+        places.entry((entry.series, regime)).or_default().push(Blame {
+            loss,
+            t_start_s: t_s[start],
+            t_end_s: t_s[end - 1],
+        });
     }
     let mut found: Vec<Mismatch> = places
         .into_iter()
         .filter_map(|((series, regime), losses)| {
-            let sum: f64 = losses.iter().map(|(loss, ..)| loss).sum();
+            let sum: f64 = losses.iter().map(|blame| blame.loss).sum();
             let mean = sum / losses.len() as f64;
-            let loud = || losses.iter().filter(|(loss, ..)| *loss >= mean);
+            let loud = || losses.iter().filter(|blame| blame.loss >= mean);
             let share = sum / total.max(f64::MIN_POSITIVE);
             (share >= LISTED_SHARE).then(|| Mismatch {
                 component: component_of(series).name().to_owned(),
                 channel: series.name().to_owned(),
                 regime: regime.name().to_owned(),
-                t_start_s: loud().map(|(_, start, _)| *start).fold(f64::INFINITY, f64::min),
-                t_end_s: loud().map(|(.., end)| *end).fold(f64::NEG_INFINITY, f64::max),
+                t_start_s: loud().map(|blame| blame.t_start_s).fold(f64::INFINITY, f64::min),
+                t_end_s: loud().map(|blame| blame.t_end_s).fold(f64::NEG_INFINITY, f64::max),
                 share,
             })
         })
@@ -142,7 +154,8 @@ pub(crate) fn regimes(objective: &Objective, stages: &Stages) -> Vec<RegimeResid
     let by_stage = [&stages.before, &stages.recalibrated, &stages.after].map(|predictions| {
         let residuals = objective.compare(predictions);
         let mut sums: BTreeMap<(Series, Regime), (f64, f64)> = BTreeMap::new();
-        let regimes: Vec<Vec<Regime>> = (0..objective.recordings()).map(|r| regimes_of(objective, r)).collect();
+        let regimes: Vec<Vec<Regime>> =
+            (0..objective.recordings()).map(|r| regimes_of(objective, r)).collect();
         for (entry, value) in objective.entries().zip(&residuals.values) {
             let regime = regimes[entry.recording][usize::midpoint(entry.block.start, entry.block.end)];
             let sum = sums.entry((entry.series, regime)).or_insert((0.0, 0.0));

@@ -38,8 +38,11 @@ pub fn screen(
     let basis = Basis::new(&present.jacobian);
     let now = basis.without(&rows(objective, &present.residuals));
     let loss_now = now.norm_squared();
-    let starts: Vec<(usize, ActiveEffect)> =
-        candidates.iter().enumerate().flat_map(|(c, candidate)| candidate.starts.iter().map(move |s| (c, *s))).collect();
+    let starts: Vec<(usize, ActiveEffect)> = candidates
+        .iter()
+        .enumerate()
+        .flat_map(|(c, candidate)| candidate.starts.iter().map(move |s| (c, *s)))
+        .collect();
     let judged: Vec<(usize, Option<Screened>)> = starts
         .par_iter()
         .map(|(candidate, start)| {
@@ -84,7 +87,8 @@ fn judge(
     let linear = start.descriptor().neutral.filter(|_| TRUSTED.contains(&step)).map(|neutral| {
         let spec = start.descriptor().parameters[0];
         let mut moved = start;
-        moved.parameters[0] = (neutral + step * (start.parameters[0] - neutral)).clamp(spec.lower, spec.upper);
+        moved.parameters[0] =
+            (neutral + step * (start.parameters[0] - neutral)).clamp(spec.lower, spec.upper);
         Screened { start: moved, gain: gain_of((now + direction * step).norm_squared()) }
     });
     match linear {

@@ -20,11 +20,14 @@ pub const WORTHWHILE_SHARE: f64 = 0.15;
 /// Loss, in squared scales, that an effect must remove whatever the share.
 pub const WORTHWHILE_LOSS: f64 = 0.12;
 
-/// Candidates that are fitted in full, of those that screening ranks first.
+/// Candidates that are fitted, of those that screening ranks first.
 const FITTED: usize = 7;
 
+/// Candidates whose fit is brought to an end, of those that fit best so far.
+const FINALISTS: usize = 2;
+
 /// Estimated gain below which a candidate is not fitted.
-const PROMISING: f64 = 0.03;
+const PROMISING: f64 = 0.05;
 
 /// Most effects that are named at once.
 const MOST_EFFECTS: usize = 3;
@@ -69,7 +72,11 @@ pub struct Selected {
 ///
 /// # Errors
 /// When the model cannot be driven.
-pub fn select(objective: &Objective, model: &JointModel, progress: &dyn Progress) -> Result<Selected, Failure> {
+pub fn select(
+    objective: &Objective,
+    model: &JointModel,
+    progress: &dyn Progress,
+) -> Result<Selected, Failure> {
     progress.stage("recalibrating", 0);
     let own = model.effects.len();
     let baseline = fit(objective, model, own, &[COARSE_STEP, FINE_STEP, FINE_STEP])?;
@@ -83,26 +90,33 @@ pub fn select(objective: &Objective, model: &JointModel, progress: &dyn Progress
         let ranked = screen(objective, &present, &all, progress);
         let promising: Vec<_> = ranked.iter().filter(|s| s.gain > PROMISING).take(FITTED).collect();
         progress.stage("fitting effects", promising.len() as u64);
-        let mut fits: Vec<(f64, ActiveEffect, Solution)> = Vec::new();
+        let mut fits: Vec<(f64, Solution)> = Vec::new();
         for screened in promising {
             let mut with = present.model.clone();
             with.effects.push(screened.start);
-            let solution = fit(objective, &with, own, &[COARSE_STEP, FINE_STEP])?;
-            let loss = objective.mean_loss(&solution.residuals, Part::HeldOut);
-            let effect = solution.model.effects[solution.model.effects.len() - 1];
-            fits.push((loss, effect, solution));
+            let solution = fit(objective, &with, own, &[COARSE_STEP])?;
+            fits.push((objective.mean_loss(&solution.residuals, Part::HeldOut), solution));
             progress.advance(1);
+        }
+        fits.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (loss, solution) in fits.iter_mut().take(FINALISTS) {
+            *solution = fit(objective, &solution.model, own, &[FINE_STEP])?;
+            *loss = objective.mean_loss(&solution.residuals, Part::HeldOut);
         }
         fits.sort_by(|a, b| a.0.total_cmp(&b.0));
         if fits.is_empty() {
             break;
         }
-        let (loss_after, effect, solution) = fits.remove(0);
+        let (loss_after, solution) = fits.remove(0);
         if !worthwhile(loss_before, loss_after) {
             break;
         }
-        let others =
-            fits.into_iter().map(|(heldout_loss, effect, _)| Tried { effect, heldout_loss }).collect();
+        let newest = |solution: &Solution| solution.model.effects[solution.model.effects.len() - 1];
+        let effect = newest(&solution);
+        let others = fits
+            .iter()
+            .map(|(heldout_loss, solution)| Tried { effect: newest(solution), heldout_loss: *heldout_loss })
+            .collect();
         chosen.push(Chosen { effect, loss_before, loss_after, others });
         present = solution;
     }

@@ -20,7 +20,11 @@ const EXPLAINING_SHARE: f64 = 0.2;
 const BINS: usize = 24;
 
 /// The channel with most structure left, if it is more than usual.
-pub(crate) fn unexplained(objective: &Objective, model: &JointModel, residuals: &Residuals) -> Option<Unexplained> {
+pub(crate) fn unexplained(
+    objective: &Objective,
+    model: &JointModel,
+    residuals: &Residuals,
+) -> Option<Unexplained> {
     let mut by_series: BTreeMap<Series, (f64, f64)> = BTreeMap::new();
     for (entry, value) in objective.entries().zip(&residuals.values) {
         let sum = by_series.entry(entry.series).or_insert((0.0, 0.0));
@@ -55,11 +59,20 @@ pub(crate) fn unexplained(objective: &Objective, model: &JointModel, residuals: 
 }
 
 /// Variables whose bins account for a good part of the residual's variance.
-fn dependence(objective: &Objective, model: &JointModel, residuals: &Residuals, series: Series) -> Vec<String> {
+fn dependence(
+    objective: &Objective,
+    model: &JointModel,
+    residuals: &Residuals,
+    series: Series,
+) -> Vec<String> {
     let mut values: Vec<f64> = Vec::new();
-    let mut variables: Vec<(&str, Vec<f64>)> =
-        [("theta_in_rad", Vec::new()), ("omega_in_rad_s", Vec::new()), ("t_s", Vec::new()), ("tension_n", Vec::new())]
-            .to_vec();
+    let mut variables: Vec<(&str, Vec<f64>)> = [
+        ("theta_in_rad", Vec::new()),
+        ("omega_in_rad_s", Vec::new()),
+        ("t_s", Vec::new()),
+        ("tension_n", Vec::new()),
+    ]
+    .to_vec();
     for (entry, value) in objective.entries().zip(&residuals.values) {
         if entry.series != series || entry.aspect != Aspect::Mean {
             continue;

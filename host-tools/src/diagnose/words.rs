@@ -52,7 +52,9 @@ fn experiment(id: &str, component: Component) -> &'static str {
             "constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded"
         }
         "gear_load_friction" => "the same slow triangle with the arm unloaded and with full weight",
-        "motor_cogging" => "one slow turn at constant speed in each direction with the tendons at low pretension",
+        "motor_cogging" => {
+            "one slow turn at constant speed in each direction with the tendons at low pretension"
+        }
         "sheath_viscous_friction" | "sheath_stribeck_friction" => {
             "triangles of equal amplitude at five speeds over two decades"
         }
@@ -61,11 +63,15 @@ fn experiment(id: &str, component: Component) -> &'static str {
         "joint_backlash" | "transmission_backlash" | "gear_backlash" => {
             "slow small triangles about the hanging position, where the torque changes sign"
         }
-        "joint_spring" | "payload_change" => "holding at five poses across the whole range for two seconds each",
+        "joint_spring" | "payload_change" => {
+            "holding at five poses across the whole range for two seconds each"
+        }
         "wrap_angle_varies_with_pose" => "small slow triangles at five poses across the whole range",
         _ => match component {
             Component::Motor => "slow triangles with the tendons unloaded",
-            Component::Transmission => "slow triangles at three amplitudes with holds of two seconds at the ends",
+            Component::Transmission => {
+                "slow triangles at three amplitudes with holds of two seconds at the ends"
+            }
             Component::Joint => "slow triangles with the weight removed",
             Component::Sensors => "the same motion with the channel's sensor exchanged for its neighbour's",
         },
@@ -92,7 +98,11 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
             let _ = write!(text, ", {name} {value:.3e}{unit}");
         }
     }
-    let _ = write!(text, "; it removes {:.0} % of the difference on data the fit did not see.", 100.0 * improvement);
+    let _ = write!(
+        text,
+        "; it removes {:.0} % of the difference on data the fit did not see.",
+        100.0 * improvement
+    );
     text
 }
 
@@ -116,7 +126,9 @@ pub(super) fn summary(
     };
     match verdict {
         Verdict::Consistent => {
-            format!("The simulation agrees with the recordings; nothing is worth adding or changing. {parameters}")
+            format!(
+                "The simulation agrees with the recordings; nothing is worth adding or changing. {parameters}"
+            )
         }
         Verdict::Recalibrate => format!("Parameters were off and no physics is missing. {parameters}"),
         Verdict::MissingPhysics => {

@@ -133,6 +133,12 @@ impl Free {
         }
     }
 
+    /// Whether it is a moment at which something happens.
+    #[must_use]
+    pub fn is_moment(&self) -> bool {
+        self.spec.unit == "s" && self.spec.scale == Scale::Linear
+    }
+
     /// Whether `value` lies at an end of the accepted range.
     #[must_use]
     pub fn at_bound(&self, value: f64) -> bool {

@@ -105,13 +105,19 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
                     return Some(DVector::zeros(here.len()));
                 }
                 let free = &self.free[j];
+                let at = |step: f64| {
+                    let mut x = self.x.clone();
+                    x[j] += step;
+                    Some(self.weighted(&self.residuals_at(&x)?, &x))
+                };
+                let [before, ahead] = [-self.step, self.step].map(|step| free.at_bound(free.value_at(self.x[j] + step)));
+                // A moment that lies too late is wrong about what went before it, which only a step back changes.
+                if free.is_moment() && !before && !ahead {
+                    return Some((at(self.step)? - at(-self.step)?) / (2.0 * self.step));
+                }
                 // Step away from the nearer bound.
-                let ahead = free.value_at(self.x[j] + self.step);
-                let step = if free.at_bound(ahead) { -self.step } else { self.step };
-                let mut x = self.x.clone();
-                x[j] += step;
-                let there = self.weighted(&self.residuals_at(&x)?, &x);
-                Some((there - &here) / step)
+                let step = if ahead { -self.step } else { self.step };
+                Some((at(step)? - &here) / step)
             })
             .collect();
         Some(DMatrix::from_columns(&columns?))

@@ -60,7 +60,8 @@ impl Run {
                     Failure::failed(format!("{}: no prediction of {}", self.name, compared.channel.role()))
                 })?;
                 let pairs = predicted.iter().zip(&compared.measured).skip(compared.from);
-                let mut differences: Vec<f64> = pairs.map(|(predicted, measured)| predicted - measured).collect();
+                let mut differences: Vec<f64> =
+                    pairs.map(|(predicted, measured)| predicted - measured).collect();
                 if compared.free_offset {
                     let offset = mean(differences.iter().copied());
                     differences.iter_mut().for_each(|difference| *difference -= offset);
@@ -221,7 +222,9 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
         let columns = self.x.len();
         let tasks: Vec<(usize, usize)> = (0..columns)
             .flat_map(|column| (0..self.runs.len()).map(move |run| (column, run)))
-            .filter(|(column, run)| self.coordinate(*column).1.is_none_or(|group| group == self.runs[*run].group))
+            .filter(|(column, run)| {
+                self.coordinate(*column).1.is_none_or(|group| group == self.runs[*run].group)
+            })
             .collect();
         let slopes: Option<Vec<Vec<f64>>> = tasks
             .par_iter()
@@ -229,7 +232,13 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
                 let mut x = self.x.clone();
                 x[*column] += self.step;
                 let there = self.residuals_of(self.runs[*run], &x)?;
-                Some(there.iter().zip(&current[*run]).map(|(there, here)| (there - here) / self.step).collect())
+                Some(
+                    there
+                        .iter()
+                        .zip(&current[*run])
+                        .map(|(there, here)| (there - here) / self.step)
+                        .collect(),
+                )
             })
             .collect();
         let mut jacobian = DMatrix::zeros(total + columns, columns);
@@ -287,8 +296,8 @@ pub fn fit(
         let optimiser = LevenbergMarquardt::new()
             .with_patience(patience)
             .with_stepbound(0.5)
-            .with_ftol(1e-4)
-            .with_xtol(1e-3)
+            .with_ftol(1e-3)
+            .with_xtol(1e-2)
             .with_gtol(1e-6);
         let (problem, _report) = optimiser.minimize(problem);
         x = problem.x;

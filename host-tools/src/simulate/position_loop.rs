@@ -165,17 +165,17 @@ viscous_nm_s_per_rad = 0.0
     /// Amplitude of the joint over that of a sine reference, by correlation over the last half of the run.
     fn gain(inertia: &str, frequency_hz: f64) -> f64 {
         let rig = Rig::parse(&RIG.replace("INERTIA", inertia), "rig.toml").unwrap();
-        let t_s: Vec<f64> = (0..8000).map(|k| k as f64 * 1e-3).collect();
+        let t_s: Vec<f64> = (0..8000).map(|k| f64::from(k) * 1e-3).collect();
         let theta: Vec<f64> = t_s.iter().map(|t| 0.1 * (TAU * frequency_hz * t).sin()).collect();
         let reference = Recording::new("sine", t_s).with(Channel::ThetaRef, theta);
         let reference = Reference::of_recording(&reference).unwrap();
         let run = run(&rig, &reference, RunOptions { seconds: 8.0, rate_hz: 1000.0, seed: 1 }).unwrap();
         let theta = run.channel(Channel::ThetaOut).unwrap();
         let (mut sin, mut cos) = (0.0, 0.0);
-        for k in 4000..8000 {
-            let (s, c) = (TAU * frequency_hz * k as f64 * 1e-3).sin_cos();
-            sin += theta[k] * s / 2000.0;
-            cos += theta[k] * c / 2000.0;
+        for (t_s, theta) in run.t_s().iter().zip(theta).skip(4000) {
+            let (s, c) = (TAU * frequency_hz * t_s).sin_cos();
+            sin += theta * s / 2000.0;
+            cos += theta * c / 2000.0;
         }
         f64::hypot(sin, cos) / 0.1
     }

@@ -82,6 +82,26 @@ fn backlash_drops_the_arm_by_half_the_gap() {
     }
 }
 
+/// An arm that flies freely through the play, its weight held from outside, comes back with half its speed from the
+/// impact, less what the ropes take in half a cycle of the ring, e^{-πζ} with ζ = 0.039.
+#[test]
+fn impact_in_the_play_halves_the_speed() {
+    for speed in [0.1, 0.3] {
+        let play = ActiveEffect::with_defaults(find("joint_backlash").unwrap()).with("gap_rad", 0.1);
+        let mut parameters = joint(0.0);
+        parameters.load.as_mut().unwrap().viscous_nm_s_per_rad = 0.0;
+        let mut run = Run::new(parameters, &[play], (InputBoundary::Angle, OutputBoundary::Arm), 1e-4);
+        run.plant.set_speed_rad_s(speed);
+        let mut slowest = speed;
+        while run.plant.t_s() < 0.075 / speed + 0.1 {
+            let weight_nm = WEIGHT_NM * run.plant.theta_out_rad().sin();
+            run.plant.step(&run.config, &StepInput { external_torque_nm: weight_nm, ..at(0.0) }, 1e-4);
+            slowest = slowest.min(run.plant.omega_out_rad_s());
+        }
+        near("speed after over before", -slowest / speed, 0.5 * (-0.039 * std::f64::consts::PI).exp(), 0.005);
+    }
+}
+
 /// Static torque: weight, and the spring of 0.3 N·m/rad, the stop of 20 N·m/rad from 0.5 rad on, the added 0.5 kg after
 /// 10 s.
 #[test]
@@ -96,6 +116,12 @@ fn static_torque_shows_spring_stop_and_payload() {
         assert!(added_nm != 0.0 || theta < 0.5);
         near(id, torque_nm(&run), WEIGHT_NM * theta.sin() + added_nm, 1e-6);
     }
+    let spring = ActiveEffect::with_defaults(find("joint_spring").unwrap()).with("rest_rad", 0.2);
+    let mut sprung = Run::new(joint(0.0), &[spring], (InputBoundary::Angle, OutputBoundary::Arm), 5e-4);
+    sprung.until(6.0, |t| at(0.4 * t.min(1.0)));
+    let theta = sprung.plant.theta_out_rad();
+    near("rest angle", torque_nm(&sprung), WEIGHT_NM * theta.sin() + 0.3 * (theta - 0.2), 1e-6);
+
     let mut run = run(Some("payload_change"));
     for (until_s, mass_kg) in [(9.9, 1.5), (16.0, 2.0)] {
         run.until(until_s, |t| at(0.4 * t.min(1.0)));

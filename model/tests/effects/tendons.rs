@@ -156,6 +156,27 @@ fn stretch_tells_the_effect() {
     }
 }
 
+/// Tendons mounted 1 mm too long, 0.177 mm more than the pretension stretches: the input turns through 2 · 11.8 mrad before
+/// one or the other cable pulls, and then with EA/L.
+#[test]
+fn loose_tendons_leave_free_play() {
+    let loose_m = 1e-3 - PRETENSION_N / STIFFNESS_N_PER_M;
+    let mut run = held(0.12, &[effect("tendon_slack").with("looseness_m", 1e-3)]);
+    for theta in [0.8, -0.8, 0.5] {
+        stretch(&mut run, theta * loose_m / RADIUS_M);
+        run.tensions_n().iter().for_each(|f| near("inside the play", *f, 0.0, 1e-9));
+    }
+    for (theta, cable) in [(1.5, 0), (-1.5, 2), (1.5, 0)] {
+        stretch(&mut run, theta * loose_m / RADIUS_M);
+        let tensions = run.tensions_n();
+        // Pulled from zero: T_in = u (EA/L) a/(1 - e^{-a}), less the mesh's 5e-5.
+        let a = 0.12 * K_RAD;
+        let want_n = 0.5 * loose_m * STIFFNESS_N_PER_M * a / -(-a).exp_m1();
+        near("pulls", tensions[cable] / want_n, 1.0, 1e-4);
+        near("hangs", tensions[2 - cable], 0.0, 1e-9);
+    }
+}
+
 /// Play of 20 mrad at the input pulley: the input turns that much farther between two equal torques of either sign.
 #[test]
 fn backlash_widens_the_loop_by_the_gap() {

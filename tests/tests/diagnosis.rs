@@ -1,0 +1,163 @@
+//! Whole diagnoses of the virtual bench: what is named, where, when, and what the written rig file predicts of a second
+//! recording.
+//!
+//! The benches are a few per cent off their rig files, as real ones are. Each diagnosis tries the whole catalogue on 24 s.
+
+use std::time::Instant;
+
+use bowden::diagnose::diagnose;
+use bowden::diagnose::verdict::{Diagnosis, NamedEffect, Verdict};
+use bowden::progress::Quiet;
+use bowden::recording::Recording;
+use bowden::replay;
+use bowden::rig::{Rig, RigDocument};
+use bowden_model::channel::Channel;
+use bowden_tests::{recording_of, rms_difference};
+use virtual_bench::{
+    Case, JointBacklash, MotionKind, MotorCoulombFriction, Parameter, PretensionLoss, SensorGainError,
+};
+
+/// Length of the diagnosed recordings, s.
+const SECONDS: f64 = 24.0;
+
+/// Length of the second recordings, s.
+const SECOND_SECONDS: f64 = 12.0;
+
+struct Outcome {
+    diagnosis: Diagnosis,
+    /// Root mean square error of the four tensions in the second recording, N: rig as it was, diagnosed rig.
+    nominal_n: f64,
+    diagnosed_n: f64,
+}
+
+impl Outcome {
+    fn of(case: &Case) -> Self {
+        let begun = Instant::now();
+        let training = recording_of(&case.train(MotionKind::Lab, SECONDS).unwrap());
+        let second = case.heldout(MotionKind::LabHeldout, SECOND_SECONDS, SECONDS).unwrap();
+        let second = on_the_clock(&recording_of(&second), SECONDS);
+        let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
+        let diagnosed = diagnose(&rig, &[training], &[], &Quiet).unwrap();
+        let mut document = RigDocument::parse(&case.rig_toml(), "rig.toml").unwrap();
+        diagnosed.write_into(&mut document).unwrap();
+        let found = Rig::parse(&document.to_string(), "rig.diagnosed.toml").unwrap();
+        let outcome = Self {
+            diagnosis: diagnosed.findings.diagnosis,
+            nominal_n: tension_error_n(&rig, &second),
+            diagnosed_n: tension_error_n(&found, &second),
+        };
+        let d = &outcome.diagnosis;
+        println!("{:?} in {:.0} s: {}", d.verdict, begun.elapsed().as_secs_f64(), d.summary);
+        println!("  second recording: {:.3} N with the rig, {:.3} N diagnosed", outcome.nominal_n, outcome.diagnosed_n);
+        for effect in &d.effects {
+            println!("  {} {:?} {:?} {:?}", effect.id, effect.onset_s, effect.channel, effect.parameters);
+        }
+        println!("  {:?}\n  {:?}", d.recalibrated, d.unexplained);
+        outcome
+    }
+
+    /// The one effect that is named.
+    fn only_effect(&self) -> &NamedEffect {
+        assert_eq!(self.diagnosis.verdict, Verdict::MissingPhysics);
+        let [effect] = self.diagnosis.effects.as_slice() else {
+            panic!("one effect expected: {:?}", self.diagnosis.effects)
+        };
+        effect
+    }
+
+    /// Asserts that the diagnosed rig leaves at most `share` of the rig's error in the second recording.
+    #[track_caller]
+    fn predicts_within(&self, share: f64) {
+        let (before, after) = (self.nominal_n, self.diagnosed_n);
+        assert!(after < share * before, "second recording: {before} N before, {after} N after");
+    }
+}
+
+/// A recording whose time goes on from an earlier one, so that what happened then has happened.
+fn on_the_clock(recording: &Recording, start_s: f64) -> Recording {
+    let t_s = recording.t_s().iter().map(|t_s| t_s + start_s).collect();
+    let mut later = Recording::new("second recording", t_s);
+    for channel in Channel::ALL {
+        if let Some(values) = recording.channel(channel) {
+            later.set(channel, values.to_vec());
+        }
+    }
+    later
+}
+
+/// Replays time and inputs alone, and compares the tensions.
+fn tension_error_n(rig: &Rig, recording: &Recording) -> f64 {
+    let mut inputs = Recording::new("inputs", recording.t_s().to_vec());
+    for channel in [Channel::ThetaIn, Channel::Duty, Channel::BusVoltage] {
+        inputs.set(channel, recording.channel(channel).unwrap().to_vec());
+    }
+    let predicted = replay::predict(rig, &inputs).unwrap();
+    let mean_square: f64 =
+        Channel::TENSIONS.iter().map(|channel| rms_difference(*channel, recording, &predicted).powi(2) / 4.0).sum();
+    mean_square.sqrt()
+}
+
+#[test]
+fn dry_friction_of_the_motor() {
+    let case = Case::new("case", vec![MotorCoulombFriction { torque_nm: 0.15, breakaway_rad: 2e-3 }.into()], 101, 3.0);
+    let outcome = Outcome::of(&case);
+    let effect = outcome.only_effect();
+    assert_eq!((effect.id.as_str(), effect.component.as_str()), ("motor_coulomb_friction", "motor"));
+    assert_eq!(effect.onset_s, None);
+    outcome.predicts_within(0.9);
+}
+
+#[test]
+fn lost_pretension() {
+    let case = Case::new("case", vec![PretensionLoss { loss: 0.25, onset_s: 11.0 }.into()], 102, 3.0);
+    let outcome = Outcome::of(&case);
+    let effect = outcome.only_effect();
+    assert_eq!((effect.id.as_str(), effect.component.as_str()), ("pretension_loss", "transmission"));
+    assert!((effect.onset_s.unwrap() - 11.0).abs() < 0.3, "{:?}", effect.onset_s);
+    outcome.predicts_within(0.3);
+}
+
+#[test]
+fn play_of_the_joint() {
+    let case = Case::new("case", vec![JointBacklash { gap_rad: 0.035 }.into()], 103, 3.0);
+    let outcome = Outcome::of(&case);
+    let effect = outcome.only_effect();
+    assert_eq!((effect.id.as_str(), effect.component.as_str()), ("joint_backlash", "joint"));
+    assert_eq!(effect.onset_s, None);
+    outcome.predicts_within(0.9);
+}
+
+#[test]
+fn wrong_gain_of_a_tension_sensor() {
+    let concealed = SensorGainError { channel: virtual_bench::Channel::F2, error: -0.1 };
+    let outcome = Outcome::of(&Case::new("case", vec![concealed.into()], 104, 3.0));
+    let effect = outcome.only_effect();
+    assert_eq!((effect.id.as_str(), effect.component.as_str()), ("sensor_gain_error", "sensors"));
+    assert_eq!(effect.channel.as_deref(), Some("f2_n"));
+    outcome.predicts_within(0.7);
+}
+
+#[test]
+fn nothing_concealed() {
+    let outcome = Outcome::of(&Case::new("case", Vec::new(), 105, 3.0));
+    assert_eq!(outcome.diagnosis.verdict, Verdict::Consistent);
+    assert_eq!(outcome.diagnosis.effects, []);
+    assert_eq!(outcome.diagnosis.unexplained, None);
+    outcome.predicts_within(1.0);
+}
+
+#[test]
+fn wrong_parameters_alone() {
+    let case = Case::new("case", Vec::new(), 106, 3.0)
+        .off(Parameter::FrictionCoefficient, 0.5)
+        .off(Parameter::AxialStiffness, 1.3);
+    let outcome = Outcome::of(&case);
+    assert_eq!(outcome.diagnosis.verdict, Verdict::Recalibrate);
+    assert_eq!(outcome.diagnosis.effects, []);
+    for (path, ratio) in [("sheath.friction_coefficient", 0.5), ("tendon.axial_stiffness_n", 1.3)] {
+        let found = outcome.diagnosis.recalibrated.iter().find(|p| p.parameter == path).unwrap();
+        let found_ratio = found.fitted / found.nominal;
+        assert!((found_ratio / ratio - 1.0).abs() < 0.06, "{path}: {found_ratio} for {ratio}");
+    }
+    outcome.predicts_within(0.5);
+}
