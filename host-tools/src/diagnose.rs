@@ -53,21 +53,37 @@ pub struct Diagnosed {
     /// Nominal parameters that fit: section, name, value.
     parameters: Vec<(&'static str, &'static str, f64)>,
     effects: Vec<ActiveEffect>,
+    /// Time that the fitted recordings took.
+    clock_s: f64,
 }
 
 impl Diagnosed {
-    /// Writes the diagnosed physics into a rig file.
+    /// Writes the diagnosed physics into a rig file: the bench as it is after the recordings. What happened at a moment has
+    /// happened, what has passed is gone, and a drift goes on from where it is.
     ///
     /// # Errors
     /// When the file cannot take a value.
     pub fn write_into(&self, document: &mut RigDocument) -> Result<(), Failure> {
+        let drift = self.effects.iter().find(|effect| effect.descriptor().id == "friction_drift");
+        let drifted = drift.map_or(1.0, |effect| (1.0 + effect.parameters[0] * self.clock_s).max(0.0));
         for (section, name, value) in &self.parameters {
-            document.set_nominal(section, name, *value)?;
+            let now = if *name == "friction_coefficient" { value * drifted } else { *value };
+            document.set_nominal(section, name, now)?;
         }
         for effect in &self.effects {
-            document.add_effect(effect)?;
+            if let Some(effect) = self.as_it_is_now(*effect, drifted) {
+                document.add_effect(&effect)?;
+            }
         }
         Ok(())
+    }
+
+    fn as_it_is_now(&self, effect: ActiveEffect, drifted: f64) -> Option<ActiveEffect> {
+        match effect.descriptor().id {
+            "wrap_angle_disturbed" if effect.parameters[1] + effect.parameters[2] < self.clock_s => None,
+            "friction_drift" => Some(effect.with("rate_per_s", effect.parameters[0] / drifted.max(1e-3))),
+            _ => Some(effect.with("time_s", 0.0)),
+        }
     }
 }
 
@@ -238,6 +254,7 @@ impl Case<'_> {
             },
             parameters,
             effects: last.model.effects[own..].to_vec(),
+            clock_s: objective.duration_s(),
         }
     }
 }

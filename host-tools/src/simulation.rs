@@ -44,6 +44,7 @@ pub struct ReplayInput {
     torque_out_nm: Option<Vec<f64>>,
     start_rad: Option<f64>,
     start_rad_s: f64,
+    clock_offset_s: f64,
 }
 
 impl ReplayInput {
@@ -91,6 +92,7 @@ impl ReplayInput {
             torque_out_nm: take(Channel::TorqueOut)?,
             start_rad,
             start_rad_s: 0.0,
+            clock_offset_s: 0.0,
             t_s,
         })
     }
@@ -122,7 +124,13 @@ impl ReplayInput {
             torque_out_nm: some(&self.torque_out_nm),
             start_rad: self.start_rad,
             start_rad_s: self.start_rad_s,
+            clock_offset_s: self.clock_offset_s,
         }
+    }
+
+    /// States how long the bench had run before the first sample, s: what happened to it then has happened already.
+    pub fn continues_after(&mut self, clock_s: f64) {
+        self.clock_offset_s = clock_s;
     }
 
     /// Sampling instants, s.
@@ -214,7 +222,7 @@ impl Run<'_> {
         let theta_in = input.motion.as_ref().map(|m| corrected(effects, Channel::ThetaIn, &input.t_s, &m.theta_rad));
         let start_rad = theta_in.as_ref().map(|t| t[0]).or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
-        plant.set_time_s(input.t_s.first().copied().unwrap_or(0.0));
+        plant.set_time_s(input.clock_offset_s + input.t_s.first().copied().unwrap_or(0.0));
         if self.drive == Drive::Duty || self.drive == Drive::Servo {
             plant.set_speed_rad_s(input.start_rad_s);
         }

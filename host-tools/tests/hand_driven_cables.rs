@@ -2,7 +2,7 @@
 //! both ends. Expected values are those of two springs, worked out by hand.
 
 use bowden_model::drive::BridgeInput;
-use bowden_model::effect::{ActiveEffect, Component, Effect, MAX_STATE, MotorPort};
+use bowden_model::effect::{ActiveEffect, Component, MAX_STATE, MotorPort};
 use bowden_model::effect_set::EffectSet;
 use bowden_model::effects::find;
 use bowden_model::parameters::{

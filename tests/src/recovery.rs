@@ -38,9 +38,14 @@ impl Recovery {
     /// # Panics
     /// If the bench refuses the effect, the model has none of that name, or the fit fails.
     #[must_use]
-    pub fn of(concealed: impl Into<ConcealedEffect>, seed: u64, start: impl Fn(ActiveEffect) -> ActiveEffect) -> Self {
+    pub fn of(
+        concealed: impl Into<ConcealedEffect>,
+        seed: u64,
+        start: impl Fn(ActiveEffect) -> ActiveEffect,
+    ) -> Self {
         let concealed = concealed.into();
-        let effect = effects::find(concealed.id()).expect("bowden's catalogue has every effect of the bench's");
+        let effect =
+            effects::find(concealed.id()).expect("bowden's catalogue has every effect of the bench's");
         let bench = BenchConfig::default().perturbed(seed, PERTURBED_PERCENT);
         let motion = Motion::new(MotionKind::Lab, SECONDS, seed);
         let recording = recording_of(&record(&bench, &[concealed], &motion, seed).expect("the bench runs"));
@@ -50,7 +55,8 @@ impl Recovery {
             step_s: 1e-3,
             ..JointModel::from_rig(&rig, &recording).expect("the recording drives the rig")
         };
-        let objective = Objective::new(&nominal, &[recording], &[], true).expect("the recording can be compared");
+        let objective =
+            Objective::new(&nominal, &[recording], &[], true).expect("the recording can be compared");
         let loss = |model: &JointModel, free: &[Free]| {
             let solution = solve(&objective, model, free, PATIENCE).expect("the model can be driven");
             (objective.mean_loss(&solution.residuals, Part::HeldOut), solution)
@@ -61,7 +67,10 @@ impl Recovery {
         let mut free = recalibrated(&with);
         free.extend(Free::of_effect(&with, 0));
         let (loss_with, fitted) = loss(&with, &free);
-        println!("held-out loss {loss_without:.3} without, {loss_with:.3} with, ratio {:.3}", loss_with / loss_without);
+        println!(
+            "held-out loss {loss_without:.3} without, {loss_with:.3} with, ratio {:.3}",
+            loss_with / loss_without
+        );
         for ((free, value), std) in free.iter().zip(&fitted.values).zip(&fitted.stds) {
             println!("  {} {value:.5} ± {:.5}", free.path(&with), std.unwrap_or(f64::NAN));
         }
@@ -72,6 +81,7 @@ impl Recovery {
     ///
     /// # Panics
     /// If it is farther off than `tolerance`, or the effect has no parameter of that name.
+    #[must_use]
     #[track_caller]
     pub fn finds(&self, parameter: &str, truth: f64, tolerance: f64) -> &Self {
         let index = self.effect.descriptor().index_of(parameter);
@@ -96,6 +106,12 @@ impl Recovery {
             self.loss_without
         );
     }
+}
+
+/// The effect begun at its defaults.
+#[must_use]
+pub fn as_it_is(effect: ActiveEffect) -> ActiveEffect {
+    effect
 }
 
 /// The effect on one sensor.

@@ -48,7 +48,10 @@ impl Outcome {
         };
         let d = &outcome.diagnosis;
         println!("{:?} in {:.0} s: {}", d.verdict, begun.elapsed().as_secs_f64(), d.summary);
-        println!("  second recording: {:.3} N with the rig, {:.3} N diagnosed", outcome.nominal_n, outcome.diagnosed_n);
+        println!(
+            "  second recording: {:.3} N with the rig, {:.3} N diagnosed",
+            outcome.nominal_n, outcome.diagnosed_n
+        );
         for effect in &d.effects {
             println!("  {} {:?} {:?} {:?}", effect.id, effect.onset_s, effect.channel, effect.parameters);
         }
@@ -92,14 +95,21 @@ fn tension_error_n(rig: &Rig, recording: &Recording) -> f64 {
         inputs.set(channel, recording.channel(channel).unwrap().to_vec());
     }
     let predicted = replay::predict(rig, &inputs).unwrap();
-    let mean_square: f64 =
-        Channel::TENSIONS.iter().map(|channel| rms_difference(*channel, recording, &predicted).powi(2) / 4.0).sum();
+    let mean_square: f64 = Channel::TENSIONS
+        .iter()
+        .map(|channel| rms_difference(*channel, recording, &predicted).powi(2) / 4.0)
+        .sum();
     mean_square.sqrt()
 }
 
 #[test]
 fn dry_friction_of_the_motor() {
-    let case = Case::new("case", vec![MotorCoulombFriction { torque_nm: 0.15, breakaway_rad: 2e-3 }.into()], 101, 3.0);
+    let case = Case::new(
+        "case",
+        vec![MotorCoulombFriction { torque_nm: 0.15, breakaway_rad: 2e-3 }.into()],
+        101,
+        3.0,
+    );
     let outcome = Outcome::of(&case);
     let effect = outcome.only_effect();
     assert_eq!((effect.id.as_str(), effect.component.as_str()), ("motor_coulomb_friction", "motor"));

@@ -129,7 +129,20 @@ fn starts(
                             .map(move |value| at.with(strength.name, value))
                     })
                     .collect(),
-                None => values.into_iter().map(|value| with_strength(&base, value)).collect(),
+                // Where friction falls with speed, the speed matters as much as the strength.
+                None => {
+                    let speed = parameters.iter().find(|spec| spec.name.starts_with("speed_"));
+                    let factors: &[f64] = if speed.is_some() { &[0.4, 1.0, 2.5] } else { &[1.0] };
+                    values
+                        .iter()
+                        .flat_map(|value| {
+                            factors.iter().map(|factor| {
+                                let start = with_strength(&base, *value);
+                                speed.map_or(start, |spec| start.with(spec.name, factor * spec.default))
+                            })
+                        })
+                        .collect()
+                }
             }
         }
     }

@@ -127,7 +127,8 @@ pub struct Residuals {
 }
 
 impl Objective {
-    /// Prepares recordings. With `split`, stretches of every recording are held out in turn; without it the recordings
+    /// Prepares recordings, which are taken to follow one another in the order given, held-out ones last: an effect with an
+    /// onset stays. With `split`, stretches of every recording are held out in turn; without it the recordings
     /// in `heldout` are, and all of `training` is fitted.
     ///
     /// # Errors
@@ -138,13 +139,17 @@ impl Objective {
         heldout: &[Recording],
         split: bool,
     ) -> Result<Self, Failure> {
-        let mut datasets = Vec::new();
+        let mut datasets: Vec<Dataset> = Vec::new();
+        let mut clock_s = 0.0;
         for (recording, part) in training
             .iter()
             .map(|recording| (recording, Part::Training))
             .chain(heldout.iter().map(|recording| (recording, Part::HeldOut)))
         {
-            datasets.push(Dataset::new(model, recording, part, split && part == Part::Training)?);
+            let mut dataset = Dataset::new(model, recording, part, split && part == Part::Training)?;
+            dataset.input.continues_after(clock_s);
+            clock_s += recording.duration_s();
+            datasets.push(dataset);
         }
         let mut series: Vec<Series> = datasets.iter().flat_map(|d| d.measured.iter().map(|(s, _)| *s)).collect();
         series.sort_unstable();
@@ -204,10 +209,14 @@ impl Objective {
         self.datasets[recording].measured.iter().find(|(s, _)| *s == series).map(|(_, v)| v.as_slice())
     }
 
-    /// Longest recording, s.
+    /// Time that all recordings with training data take together, s: the clock of effects with an onset.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        self.datasets.iter().map(|d| d.input.t_s().last().unwrap_or(&0.0) - d.input.t_s()[0]).fold(0.0, f64::max)
+        self.datasets
+            .iter()
+            .filter(|d| d.blocks.iter().any(|block| block.part == Part::Training))
+            .map(|d| d.input.t_s().last().unwrap_or(&0.0) - d.input.t_s()[0])
+            .sum()
     }
 
     /// Origin of every entry of [`Residuals::values`].
