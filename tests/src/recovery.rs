@@ -115,7 +115,6 @@ pub fn as_it_is(effect: ActiveEffect) -> ActiveEffect {
 }
 
 /// The effect on one sensor.
-#[must_use]
 pub fn on(channel: bowden_model::channel::Channel) -> impl Fn(ActiveEffect) -> ActiveEffect {
     move |effect| ActiveEffect { target: Target::One(channel), ..effect }
 }

@@ -35,7 +35,7 @@ impl Outcome {
         let begun = Instant::now();
         let training = recording_of(&case.train(MotionKind::Lab, SECONDS).unwrap());
         let second = case.heldout(MotionKind::LabHeldout, SECOND_SECONDS, SECONDS).unwrap();
-        let second = on_the_clock(&recording_of(&second), SECONDS);
+        let second = recording_of(&second);
         let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
         let diagnosed = diagnose(&rig, &[training], &[], &Quiet).unwrap();
         let mut document = RigDocument::parse(&case.rig_toml(), "rig.toml").unwrap();
@@ -74,18 +74,6 @@ impl Outcome {
         let (before, after) = (self.nominal_n, self.diagnosed_n);
         assert!(after < share * before, "second recording: {before} N before, {after} N after");
     }
-}
-
-/// A recording whose time goes on from an earlier one, so that what happened then has happened.
-fn on_the_clock(recording: &Recording, start_s: f64) -> Recording {
-    let t_s = recording.t_s().iter().map(|t_s| t_s + start_s).collect();
-    let mut later = Recording::new("second recording", t_s);
-    for channel in Channel::ALL {
-        if let Some(values) = recording.channel(channel) {
-            later.set(channel, values.to_vec());
-        }
-    }
-    later
 }
 
 /// Replays time and inputs alone, and compares the tensions.

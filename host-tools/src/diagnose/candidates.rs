@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use bowden_model::channel::Channel;
-use bowden_model::effect::{ActiveEffect, Component, Descriptor, Target};
+use bowden_model::effect::{ActiveEffect, Component, Descriptor, ParameterSpec, Target};
 use bowden_model::effects::CATALOGUE;
 
 use crate::fit::objective::{Objective, Series};
@@ -96,7 +96,6 @@ fn starts(
     let strength = parameters.first();
     let signed = strength.is_some_and(|spec| spec.lower < 0.0);
     let both_signs = |value: f64| if signed { vec![value, -value] } else { vec![value] };
-    let duration_s = objective.duration_s();
     let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
     match base.descriptor().id {
         "motor_cogging" => cogging_start(base, objective, predictions).into_iter().collect(),
@@ -108,44 +107,58 @@ fn starts(
             .collect(),
         "sensor_gain_error" => [0.92, 1.08].map(|gain| base.with("gain", gain)).to_vec(),
         "sensor_lag" => [0.01, 0.05].map(|lag| base.with("time_constant_s", lag)).to_vec(),
-        _ => {
-            let Some(strength) = strength else { return vec![base] };
-            let values: Vec<f64> = [0.4, 1.0, 2.5]
-                .iter()
-                .flat_map(|factor| both_signs(from_neutral(base, strength.default, *factor)))
-                .collect();
-            let with_strength = |start: &ActiveEffect, value: f64| {
-                start.with(strength.name, value.clamp(strength.lower, strength.upper))
-            };
-            match onset {
-                // One strength for every moment; the strength is found once the moment is.
-                Some(onset) => (0..ONSETS)
-                    .flat_map(|k| {
-                        let at = base
-                            .with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
-                            .with("duration_s", duration_s / 6.0);
-                        both_signs(strength.default)
-                            .into_iter()
-                            .map(move |value| at.with(strength.name, value))
-                    })
-                    .collect(),
-                // Where friction falls with speed, the speed matters as much as the strength.
-                None => {
-                    let speed = parameters.iter().find(|spec| spec.name.starts_with("speed_"));
-                    let factors: &[f64] = if speed.is_some() { &[0.4, 1.0, 2.5] } else { &[1.0] };
-                    values
-                        .iter()
-                        .flat_map(|value| {
-                            factors.iter().map(|factor| {
-                                let start = with_strength(&base, *value);
-                                speed.map_or(start, |spec| start.with(spec.name, factor * spec.default))
-                            })
-                        })
-                        .collect()
-                }
+        _ => match (strength, onset) {
+            (None, _) => vec![base],
+            (Some(strength), Some(onset)) => {
+                onset_starts(base, onset, &both_signs(strength.default), objective.duration_s())
             }
-        }
+            (Some(strength), None) => {
+                let values: Vec<f64> = [0.4, 1.0, 2.5]
+                    .iter()
+                    .flat_map(|factor| both_signs(from_neutral(base, strength.default, *factor)))
+                    .map(|value| value.clamp(strength.lower, strength.upper))
+                    .collect();
+                steady_starts(base, &values)
+            }
+        },
     }
+}
+
+/// The given strengths at moments spread over the recordings.
+fn onset_starts(
+    base: ActiveEffect,
+    onset: &ParameterSpec,
+    strengths: &[f64],
+    duration_s: f64,
+) -> Vec<ActiveEffect> {
+    (0..ONSETS)
+        .flat_map(|k| {
+            let at = base
+                .with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
+                .with("duration_s", duration_s / 6.0);
+            strengths.iter().map(move |value| with_strength(at, *value))
+        })
+        .collect()
+}
+
+/// The given strengths; where friction falls with speed, the speed matters as much as the strength.
+fn steady_starts(base: ActiveEffect, strengths: &[f64]) -> Vec<ActiveEffect> {
+    let speed = base.descriptor().parameters.iter().find(|spec| spec.name.starts_with("speed_"));
+    let factors: &[f64] = if speed.is_some() { &[0.4, 1.0, 2.5] } else { &[1.0] };
+    strengths
+        .iter()
+        .flat_map(|value| {
+            factors.iter().map(|factor| {
+                let start = with_strength(base, *value);
+                speed.map_or(start, |spec| start.with(spec.name, factor * spec.default))
+            })
+        })
+        .collect()
+}
+
+fn with_strength(mut effect: ActiveEffect, value: f64) -> ActiveEffect {
+    effect.parameters[0] = value;
+    effect
 }
 
 /// The default strength, with its distance from no effect scaled by `factor`.

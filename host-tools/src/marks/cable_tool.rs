@@ -36,7 +36,7 @@ const RIGS: [(&str, &str); 4] = [
     ("T5L_3", include_str!("../../rigs/davinci-T5L_3.toml")),
 ];
 
-/// Recordings whose name is not that of a tool: wrist poses of one tool, which a fit cannot tell from T4L_4.
+/// Recordings whose name is not that of a tool: wrist poses of one tool, which a fit cannot tell from `T4L_4`.
 const SAME_TOOL: [(&str, &str); 2] = [("T4L_Roll", "T4L_4"), ("T4L_Pitch", "T4L_4")];
 
 /// Start-up transient that the source advises to drop, s.

@@ -64,7 +64,9 @@ impl Run {
                     pairs.map(|(predicted, measured)| predicted - measured).collect();
                 if compared.free_offset {
                     let offset = mean(differences.iter().copied());
-                    differences.iter_mut().for_each(|difference| *difference -= offset);
+                    for difference in &mut differences {
+                        *difference -= offset;
+                    }
                 }
                 Ok(differences)
             })

@@ -213,11 +213,14 @@ pub fn held_out(runs: &[Run], physics: Physics, split: Split) -> Result<Vec<f64>
     runs.iter().zip(&models).map(|(run, model)| error_rad(run, model)).collect()
 }
 
+/// Fitted values under their names in a rig file.
+pub type NamedValues = Vec<(String, f64)>;
+
 /// Errors of all runs, rad, with the physics fitted to all of them, and the fitted values with their names.
 ///
 /// # Errors
 /// When a model cannot be driven.
-pub fn in_sample(runs: &[Run], physics: Physics) -> Result<(Vec<f64>, Vec<(String, f64)>), Failure> {
+pub fn in_sample(runs: &[Run], physics: Physics) -> Result<(Vec<f64>, NamedValues), Failure> {
     let (runs, knobs) = prepared(runs, physics);
     let fitted = fit(&runs.iter().collect::<Vec<_>>(), &knobs, None, &STEPS, PATIENCE)?;
     let errors: Result<Vec<f64>, Failure> =
