@@ -102,7 +102,11 @@ impl JointModel {
     ///
     /// # Errors
     /// When the rig lacks a part that the boundaries need.
-    pub fn plant_between(&self, input: InputBoundary, output: OutputBoundary) -> Result<PlantConfig, Failure> {
+    pub fn plant_between(
+        &self,
+        input: InputBoundary,
+        output: OutputBoundary,
+    ) -> Result<PlantConfig, Failure> {
         let effects = EffectSet::from_slice(&self.effects).map_err(Failure::bad_input)?;
         PlantConfig::new(self.parameters, self.elements, effects, input, output).map_err(Failure::bad_input)
     }
@@ -115,11 +119,10 @@ impl JointModel {
     /// When the recording lacks what drives the joint.
     pub fn from_rig(rig: &Rig, recording: &Recording) -> Result<Self, Failure> {
         let roles = rig.roles(recording)?;
-        let servo = rig.controller.map(|Controller::Proportional { gain_duty_per_rad, duty_limit, delay_s }| ServoLaw {
-            gain_duty_per_rad,
-            duty_limit,
-            delay_s,
-        });
+        let servo =
+            rig.controller.map(|Controller::Proportional { gain_duty_per_rad, duty_limit, delay_s }| {
+                ServoLaw { gain_duty_per_rad, duty_limit, delay_s }
+            });
         Ok(Self {
             parameters: rig.joint,
             effects: rig.effects.clone(),

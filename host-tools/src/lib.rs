@@ -3,17 +3,17 @@
 
 pub mod cli;
 pub mod commands;
-pub mod outcome;
-pub mod output;
-pub mod progress;
-pub mod recording;
-pub mod rig;
+pub mod diagnose;
 pub mod fit;
 pub mod joint_model;
 pub mod marks;
+pub mod outcome;
+pub mod output;
+pub mod progress;
 pub mod reconstruct;
+pub mod recording;
 pub mod replay;
+pub mod report;
+pub mod rig;
 pub mod simulate;
 pub mod simulation;
-pub mod diagnose;
-pub mod report;

@@ -55,7 +55,8 @@ impl Reference {
     /// # Errors
     /// When the recording has no `theta_ref_rad`.
     pub fn of_recording(recording: &Recording) -> Result<Self, Failure> {
-        let (Some(theta), Some(start_s)) = (recording.channel(Channel::ThetaRef), recording.t_s().first()) else {
+        let (Some(theta), Some(start_s)) = (recording.channel(Channel::ThetaRef), recording.t_s().first())
+        else {
             return Err(Failure::bad_input(format!(
                 "{}:1: no column `theta_ref_rad`; name the reference so",
                 recording.source()

@@ -178,7 +178,8 @@ pub fn replay(model: &JointModel, input: &ReplayInput) -> Result<Prediction, Fai
     let run = Run { model, config: &config, input, drive };
     if drive == Drive::GuidedMotor {
         let no_torque = vec![0.0; input.t_s.len()];
-        let first = run.execute(Guide { stiffness_nm_per_rad: STIFF_GUIDE_NM_PER_RAD, ahead_nm: &no_torque }, &[]);
+        let first =
+            run.execute(Guide { stiffness_nm_per_rad: STIFF_GUIDE_NM_PER_RAD, ahead_nm: &no_torque }, &[]);
         let mut ahead_nm = first.guide_nm;
         let half = (GUIDE_FILTER_S / median_step_s(&input.t_s)).round() as usize;
         for _ in 0..2 {
@@ -219,7 +220,8 @@ impl Run<'_> {
         let n = input.t_s.len();
         let longest_s = self.model.step_s.min(self.config.stable_step_s());
         let effects = self.config.effects();
-        let theta_in = input.motion.as_ref().map(|m| corrected(effects, Channel::ThetaIn, &input.t_s, &m.theta_rad));
+        let theta_in =
+            input.motion.as_ref().map(|m| corrected(effects, Channel::ThetaIn, &input.t_s, &m.theta_rad));
         let start_rad = theta_in.as_ref().map(|t| t[0]).or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
         plant.set_time_s(input.clock_offset_s + input.t_s.first().copied().unwrap_or(0.0));
@@ -243,8 +245,10 @@ impl Run<'_> {
                     let mut step = self.step_input(k - 1, wanted);
                     match self.drive {
                         Drive::GuidedMotor => {
-                            let band =
-                                input.motion.as_ref().map_or(0.0, |m| GUIDE_DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
+                            let band = input
+                                .motion
+                                .as_ref()
+                                .map_or(0.0, |m| GUIDE_DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
                             let error = plant.theta_in_rad() - wanted;
                             let beyond = error - error.clamp(-band, band);
                             step.input_torque_nm = guide.ahead_nm[k] - guide.stiffness_nm_per_rad * beyond;

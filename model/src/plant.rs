@@ -391,13 +391,15 @@ impl Plant {
         }
         match (config.input, motor) {
             (InputBoundary::Motor, Some(motor)) => {
-                let load_nm = -self.torque_in_nm(config) - self.rope_loss_nm(config) * Self::pulley_ratio(config);
+                let load_nm =
+                    -self.torque_in_nm(config) - self.rope_loss_nm(config) * Self::pulley_ratio(config);
                 let play_rad = self.turn_rotor(config, motor, load_nm, input.input_torque_nm, dt_s);
                 let delta_rad = dt_s * self.omega_motor_rad_s;
                 self.theta_motor_rad += delta_rad;
                 self.turn_input(config, delta_rad);
                 if play_rad > 0.0 || self.gear_offset_rad != 0.0 {
-                    self.gear_offset_rad = self.relax_play(config, End::Input, self.gear_offset_rad, play_rad);
+                    self.gear_offset_rad =
+                        self.relax_play(config, End::Input, self.gear_offset_rad, play_rad);
                 }
                 let before = self.theta_in_rad;
                 self.theta_in_rad = self.theta_motor_rad - self.gear_offset_rad;
@@ -420,7 +422,8 @@ impl Plant {
     fn rub_spindle(&mut self, config: &PlantConfig, delta_rad: f64, dt_s: f64) {
         let load_nm = -self.torque_in_nm(config);
         let port = self.motor_port(config, 0.0, load_nm, load_nm.abs(), dt_s);
-        self.spindle_presliding = (self.spindle_presliding + delta_rad / SPINDLE_PRESLIDING_RAD).clamp(-1.0, 1.0);
+        self.spindle_presliding =
+            (self.spindle_presliding + delta_rad / SPINDLE_PRESLIDING_RAD).clamp(-1.0, 1.0);
         self.spindle_friction_nm = port.coulomb_nm * self.spindle_presliding - port.torque_nm;
     }
 
@@ -545,7 +548,8 @@ impl Plant {
         }
         if port.play_rad > 0.0 || self.joint_offset_rad != 0.0 {
             let before = self.joint_offset_rad.abs();
-            self.joint_offset_rad = self.relax_play(config, End::Output, self.joint_offset_rad, port.play_rad);
+            self.joint_offset_rad =
+                self.relax_play(config, End::Output, self.joint_offset_rad, port.play_rad);
             let half = 0.5 * port.play_rad;
             if self.joint_offset_rad.abs() >= half && before < half {
                 let closing_rad_s = Self::pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
@@ -559,16 +563,23 @@ impl Plant {
     /// Newton steps on the torque. Along a turn the cables only soften, so that the slope of the last turn falls short
     /// rather than beyond; a turn that begins takes the slope of cables that stick everywhere, because the one from
     /// before a reversal is too soft and would throw the joint to and fro.
-    fn balance_output(&mut self, config: &PlantConfig, outside_nm: f64, coulomb_nm: f64, drag_nm_per_rad: f64) {
+    fn balance_output(
+        &mut self,
+        config: &PlantConfig,
+        outside_nm: f64,
+        coulomb_nm: f64,
+        drag_nm_per_rad: f64,
+    ) {
         /// Newton steps at most; what is left then is taken up by the next simulation step.
         const STEPS: usize = 30;
         /// Turn below which the joint counts as balanced, rad; far below any encoder.
         const BALANCED_RAD: f64 = 1e-8;
         /// Longest single turn, rad: a step across free play.
         const LONGEST_RAD: f64 = 0.1;
-        let sticking = config.transmission.as_ref().map_or(f64::INFINITY, |parts| {
-            parts.sticking_stiffness_nm_per_rad(End::Output)
-        });
+        let sticking = config
+            .transmission
+            .as_ref()
+            .map_or(f64::INFINITY, |parts| parts.sticking_stiffness_nm_per_rad(End::Output));
         let (mut turned_rad, mut last_rad) = (0.0, 0.0);
         for _ in 0..STEPS {
             let torque_nm = self.torque_out_nm(config) + outside_nm - drag_nm_per_rad * turned_rad;

@@ -235,7 +235,13 @@ impl Transmission {
     /// pulley before the arm ([`End::Output`]). Returns the new lead, within ± half of `play_rad`. The first step assumes
     /// tendons that stick next to the pulley, the stiffest they can be; they get softer as they slip, so that each step
     /// falls short of the place and none swings across it, which would feed energy into the play.
-    pub(crate) fn relax_play(&mut self, config: &TransmissionConfig, end: End, offset_rad: f64, play_rad: f64) -> f64 {
+    pub(crate) fn relax_play(
+        &mut self,
+        config: &TransmissionConfig,
+        end: End,
+        offset_rad: f64,
+        play_rad: f64,
+    ) -> f64 {
         let half = 0.5 * play_rad;
         let mut offset_rad = offset_rad;
         let mut stiffness = config.sticking_stiffness_nm_per_rad(end);

@@ -13,12 +13,21 @@ use crate::outcome::Failure;
 use crate::progress::Progress;
 
 /// Share of the held-out loss that an effect must remove. Contact, mesh and solver of a real bench differ from the
-/// simulation by some 0.2 N; effects that imitate that remove up to a tenth (measured on the virtual bench without any
-/// concealed effect).
-pub const WORTHWHILE_SHARE: f64 = 0.15;
+/// simulation by some 0.2 N, and effects that imitate that remove a part of it.
+pub const WORTHWHILE_SHARE: f64 = 0.25;
 
 /// Loss, in squared scales, that an effect must remove whatever the share.
-pub const WORTHWHILE_LOSS: f64 = 0.12;
+pub const WORTHWHILE_LOSS: f64 = 0.3;
+
+/// Advantage in held-out loss that each further parameter must earn between two candidates.
+const LOSS_PER_PARAMETER: f64 = 0.03;
+
+/// Strength, as a part of the typical one, below which an effect is not worth a name.
+const NAMED_STRENGTH: f64 = 0.1;
+
+/// Presliding below which a contact is an ordinary one, m: every real contact gives way by about ten micrometres before
+/// it slips.
+const ORDINARY_PRESLIDING_M: f64 = 4e-5;
 
 /// Candidates that are fitted, of those that screening ranks first.
 const FITTED: usize = 7;
@@ -98,12 +107,14 @@ pub fn select(
             fits.push((objective.mean_loss(&solution.residuals, Part::HeldOut), solution));
             progress.advance(1);
         }
-        fits.sort_by(|a, b| a.0.total_cmp(&b.0));
+        fits.retain(|(_, solution)| !solution.model.effects.last().is_some_and(negligible));
+        fits.sort_by(|a, b| handicapped(a.0, &a.1).total_cmp(&handicapped(b.0, &b.1)));
         for (loss, solution) in fits.iter_mut().take(FINALISTS) {
             *solution = fit(objective, &solution.model, own, &[FINE_STEP])?;
             *loss = objective.mean_loss(&solution.residuals, Part::HeldOut);
         }
-        fits.sort_by(|a, b| a.0.total_cmp(&b.0));
+        fits.retain(|(_, solution)| !solution.model.effects.last().is_some_and(negligible));
+        fits.sort_by(|a, b| handicapped(a.0, &a.1).total_cmp(&handicapped(b.0, &b.1)));
         if fits.is_empty() {
             break;
         }
@@ -128,6 +139,29 @@ pub fn select(
 #[must_use]
 pub fn worthwhile(before: f64, after: f64) -> bool {
     before - after > WORTHWHILE_LOSS && before - after > WORTHWHILE_SHARE * before
+}
+
+/// Whether an effect was fitted so weak that it is hardly there.
+fn negligible(effect: &ActiveEffect) -> bool {
+    let descriptor = effect.descriptor();
+    let Some(strength) = descriptor.parameters.first() else { return false };
+    let value = effect.parameters[0];
+    match descriptor.id {
+        "presliding_compliance" => value < ORDINARY_PRESLIDING_M,
+        // Friction that hardly falls with speed is dry friction, which has a name of its own.
+        "motor_stribeck_friction" => value < 0.3 * effect.parameters[2].max(strength.default),
+        // The typical offset depends on the channel; the loss alone decides.
+        "sensor_offset" => false,
+        _ => descriptor.neutral.is_some_and(|neutral| {
+            (value - neutral).abs() < NAMED_STRENGTH * (strength.default - neutral).abs()
+        }),
+    }
+}
+
+/// Held-out loss with the advantage that simpler effects get.
+fn handicapped(loss: f64, solution: &Solution) -> f64 {
+    let parameters = solution.model.effects.last().map_or(0, |effect| effect.descriptor().parameters.len());
+    loss * (1.0 + LOSS_PER_PARAMETER * parameters as f64)
 }
 
 /// Removes effects that the later ones have made superfluous.

@@ -192,5 +192,9 @@ pub fn recalibrated(model: &JointModel) -> Vec<Free> {
 /// The parameters of [`RECALIBRATED`] and [`VISCOUS`] that `model` has.
 #[must_use]
 pub fn recalibrated_with_viscous(model: &JointModel) -> Vec<Free> {
-    RECALIBRATED.iter().chain(&VISCOUS).filter_map(|(section, name)| Free::nominal(model, section, name)).collect()
+    RECALIBRATED
+        .iter()
+        .chain(&VISCOUS)
+        .filter_map(|(section, name)| Free::nominal(model, section, name))
+        .collect()
 }

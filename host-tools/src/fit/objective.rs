@@ -151,7 +151,8 @@ impl Objective {
             clock_s += recording.duration_s();
             datasets.push(dataset);
         }
-        let mut series: Vec<Series> = datasets.iter().flat_map(|d| d.measured.iter().map(|(s, _)| *s)).collect();
+        let mut series: Vec<Series> =
+            datasets.iter().flat_map(|d| d.measured.iter().map(|(s, _)| *s)).collect();
         series.sort_unstable();
         series.dedup();
         if series.is_empty() {
@@ -161,7 +162,8 @@ impl Objective {
                 names.join(", ")
             )));
         }
-        let noise_variances: Vec<_> = series.iter().map(|s| (*s, noise_variance(model, *s, &datasets))).collect();
+        let noise_variances: Vec<_> =
+            series.iter().map(|s| (*s, noise_variance(model, *s, &datasets))).collect();
         let scales = noise_variances
             .iter()
             .map(|(series, noise)| (*series, scale_of(model, *series, *noise, &datasets)))
@@ -265,7 +267,8 @@ impl Objective {
                 let noise_variance = self.noise_variance(*series);
                 let mut scatter = Vec::with_capacity(dataset.blocks.len());
                 for block in &dataset.blocks {
-                    let [real, simulated] = [measured.as_slice(), predicted].map(|v| moments(&v[block.start..block.end]));
+                    let [real, simulated] =
+                        [measured.as_slice(), predicted].map(|v| moments(&v[block.start..block.end]));
                     values.push((real.mean - simulated.mean - offset) / scale);
                     scatter.push([real.variance, simulated.variance + noise_variance]);
                 }
@@ -357,14 +360,17 @@ impl Dataset {
         let mut measured: Vec<(Series, Vec<f64>)> = model
             .outputs
             .iter()
-            .filter_map(|channel| recording.channel(*channel).map(|v| (Series::Channel(*channel), v.to_vec())))
+            .filter_map(|channel| {
+                recording.channel(*channel).map(|v| (Series::Channel(*channel), v.to_vec()))
+            })
             .collect();
         if model.drive()? == crate::joint_model::Drive::GuidedMotor {
             measured.push((Series::Guide, vec![0.0; recording.len()]));
         }
         let t_s = input.t_s();
         let mut blocks: Vec<Block> = Vec::new();
-        let mut start = t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
+        let mut start =
+            t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
         while start < t_s.len() {
             let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
             let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
@@ -414,7 +420,9 @@ fn moments(values: &[f64]) -> Moments {
 }
 
 fn recorded(datasets: &[Dataset], series: Series) -> impl Iterator<Item = &[f64]> {
-    datasets.iter().flat_map(move |d| d.measured.iter().filter(move |(s, _)| *s == series).map(|(_, v)| v.as_slice()))
+    datasets
+        .iter()
+        .flat_map(move |d| d.measured.iter().filter(move |(s, _)| *s == series).map(|(_, v)| v.as_slice()))
 }
 
 /// White noise of the sensor, and a twelfth of its step squared.

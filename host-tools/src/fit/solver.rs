@@ -110,7 +110,8 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
                     x[j] += step;
                     Some(self.weighted(&self.residuals_at(&x)?, &x))
                 };
-                let [before, ahead] = [-self.step, self.step].map(|step| free.at_bound(free.value_at(self.x[j] + step)));
+                let [before, ahead] =
+                    [-self.step, self.step].map(|step| free.at_bound(free.value_at(self.x[j] + step)));
                 // A moment that lies too late is wrong about what went before it, which only a step back changes.
                 if free.is_moment() && !before && !ahead {
                     return Some((at(self.step)? - at(-self.step)?) / (2.0 * self.step));
@@ -130,7 +131,12 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 ///
 /// # Errors
 /// When the model cannot be driven.
-pub fn solve(objective: &Objective, model: &JointModel, free: &[Free], patience: usize) -> Result<Solution, Failure> {
+pub fn solve(
+    objective: &Objective,
+    model: &JointModel,
+    free: &[Free],
+    patience: usize,
+) -> Result<Solution, Failure> {
     solve_in_rounds(objective, model, free, patience, &[COARSE_STEP, FINE_STEP, FINE_STEP])
 }
 
@@ -159,7 +165,8 @@ pub fn solve_in_rounds(
     let mut fixed = vec![false; free.len()];
     let mut x = DVector::zeros(free.len());
     for (round, &step) in rounds.iter().enumerate() {
-        let mut problem = Problem { objective, model, free, fixed: &fixed, step, x: x.clone(), current: None };
+        let mut problem =
+            Problem { objective, model, free, fixed: &fixed, step, x: x.clone(), current: None };
         problem.set_params(&x);
         let optimiser = LevenbergMarquardt::new()
             .with_patience(patience)
@@ -181,12 +188,15 @@ pub fn solve_in_rounds(
             break;
         }
     }
-    let mut problem = Problem { objective, model, free, fixed: &fixed, step: FINE_STEP, x: x.clone(), current: None };
+    let mut problem =
+        Problem { objective, model, free, fixed: &fixed, step: FINE_STEP, x: x.clone(), current: None };
     problem.set_params(&x);
     let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
     let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
     let rows = problem.residuals().unwrap_or_else(|| DVector::zeros(0));
-    let variance = (rows.norm_squared() / (rows.len() as f64 / CORRELATED_BLOCKS - free.len() as f64).max(1.0)).max(1e-300);
+    let variance = (rows.norm_squared()
+        / (rows.len() as f64 / CORRELATED_BLOCKS - free.len() as f64).max(1.0))
+    .max(1e-300);
     let stds = standard_deviations(&jacobian, &fixed)
         .into_iter()
         .zip(free.iter().zip(&values))
@@ -202,7 +212,10 @@ pub fn solve_in_rounds(
 
 /// Square roots of the diagonal of `(JᵀJ)⁻¹`.
 fn standard_deviations(jacobian: &DMatrix<f64>, fixed: &[bool]) -> Vec<Option<f64>> {
-    let open: Vec<usize> = (0..fixed.len()).filter(|j| !fixed[*j]).collect();
+    // A parameter without any slope has no spread to tell and would make the others' unsolvable.
+    let open: Vec<usize> = (0..fixed.len())
+        .filter(|j| !fixed[*j] && jacobian.nrows() > 0 && jacobian.column(*j).norm_squared() > 0.0)
+        .collect();
     let columns: Vec<_> = open.iter().map(|j| jacobian.column(*j).into_owned()).collect();
     let mut stds = vec![None; fixed.len()];
     if columns.is_empty() || jacobian.nrows() == 0 {

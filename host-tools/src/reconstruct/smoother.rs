@@ -163,7 +163,10 @@ impl Filter {
             let ahead = match filtered.last() {
                 Some(&last) => predict(last, t_s[k] - t_s[k - 1], density),
                 // Before the first reading the angle is unknown by far more than a count, the speed by 10 rad/s.
-                None => Estimate { mean: [reading.value_rad, 0.0], covariance: [100.0 * reading.variance, 0.0, 100.0] },
+                None => Estimate {
+                    mean: [reading.value_rad, 0.0],
+                    covariance: [100.0 * reading.variance, 0.0, 100.0],
+                },
             };
             let [tt, to, oo] = ahead.covariance;
             let innovation = reading.value_rad - ahead.mean[0];
@@ -191,13 +194,10 @@ impl Filter {
             let cross = [[tt + dt_s * to, to], [to + dt_s * oo, oo]];
             let [att, ato, aoo] = ahead.covariance;
             let determinant = att * aoo - ato * ato;
-            let gain = cross.map(|[a, b]| [(a * aoo - b * ato) / determinant, (b * att - a * ato) / determinant]);
+            let gain =
+                cross.map(|[a, b]| [(a * aoo - b * ato) / determinant, (b * att - a * ato) / determinant]);
             let change = [later.mean[0] - ahead.mean[0], later.mean[1] - ahead.mean[1]];
-            let spread = [
-                later.covariance[0] - att,
-                later.covariance[1] - ato,
-                later.covariance[2] - aoo,
-            ];
+            let spread = [later.covariance[0] - att, later.covariance[1] - ato, later.covariance[2] - aoo];
             let quadratic = |g: [f64; 2], h: [f64; 2]| {
                 g[0] * h[0] * spread[0] + (g[0] * h[1] + g[1] * h[0]) * spread[1] + g[1] * h[1] * spread[2]
             };

@@ -351,7 +351,11 @@ fn read_replay(section: &Section, has_controller: bool) -> Result<Replay, Failur
         _ => None,
     })?;
     let relative_inputs =
-        read_channels(section, "relative_inputs", |channel| if drives(&channel) { None } else { no_input() })?;
+        read_channels(
+            section,
+            "relative_inputs",
+            |channel| if drives(&channel) { None } else { no_input() },
+        )?;
     let mut smoothing_s = Vec::new();
     if let Some(table) = section.section("smoothing_s", "replay.smoothing_s")? {
         table.refuse_unknown("role", Channel::ALL.into_iter().map(Channel::role))?;

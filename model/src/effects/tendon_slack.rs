@@ -32,12 +32,7 @@ impl Effect for TendonSlack {
         &DESCRIPTOR
     }
 
-    fn transmission(
-        &self,
-        p: &[f64; MAX_PARAMETERS],
-        _state: &mut EffectState,
-        port: &mut TransmissionPort,
-    ) {
+    fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for tendon in &mut port.tendons {
             tendon.unilateral = true;
             tendon.added_length_m += p[0];
