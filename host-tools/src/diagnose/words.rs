@@ -95,7 +95,7 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
         if spec.name.ends_with("time_s") || spec.name == "start_s" {
             let _ = write!(text, ", at {value:.2} s of {duration_s:.0} s");
         } else {
-            let _ = write!(text, ", {name} {value:.3e}{unit}");
+            let _ = write!(text, ", {name} {}{unit}", short(value));
         }
     }
     let _ = write!(
@@ -104,6 +104,19 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
         100.0 * improvement
     );
     text
+}
+
+/// Three significant digits, in plain digits where that is readable.
+fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let decade = value.abs().log10().floor();
+    if (-4.0..5.0).contains(&decade) {
+        format!("{value:.*}", (2.0 - decade).max(0.0) as usize)
+    } else {
+        format!("{value:.2e}")
+    }
 }
 
 /// The diagnosis in two sentences.
@@ -141,6 +154,25 @@ pub(super) fn summary(
         }
         Verdict::Unexplained => {
             format!("The recordings hold structure that no effect of the catalogue explains. {parameters}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn numbers_keep_three_digits_and_stay_readable() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.236, "0.236"),
+            (-1.2424, "-1.24"),
+            (1234.6, "1235"),
+            (0.000_123, "0.000123"),
+            (1e-7, "1.00e-7"),
+        ] {
+            assert_eq!(short(value), text);
         }
     }
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::process::{self, built, cargo};
 
 /// What the bench conceals, with which strength, and the seed of the case.
-const CONCEALED: &str = "wrap_angle_varies_with_pose:1";
+const CONCEALED: &str = "pretension_loss:1";
 const SEED: &str = "11";
 
 /// Runs the demonstration in `bowden-demo` below the current folder.
