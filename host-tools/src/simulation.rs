@@ -342,23 +342,9 @@ impl<'a> Sampler<'a> {
     }
 
     fn sample(&mut self, config: &PlantConfig, plant: &Plant, duty: f64, (t_s, dt_s): (f64, f64)) {
-        let [f1, f2, f3, f4] = plant.end_tensions_n(config);
         for ((channel, values), states) in self.channels.iter_mut().zip(&mut self.states) {
-            let value = match channel {
-                Channel::ThetaMotor => plant.theta_motor_rad(),
-                Channel::ThetaIn => plant.theta_in_rad(),
-                Channel::ThetaOut => plant.theta_out_rad(),
-                Channel::F1 => f1,
-                Channel::F2 => f2,
-                Channel::F3 => f3,
-                Channel::F4 => f4,
-                Channel::TorqueIn => plant.driving_torque_nm(config),
-                Channel::TorqueOut => plant.torque_out_nm(config),
-                Channel::MotorCurrent => plant.current_a(),
-                Channel::Duty => duty,
-                // Never predicted: they come from outside the joint.
-                Channel::ThetaRef | Channel::BusVoltage | Channel::DriveEnable => 0.0,
-            };
+            let outside = if *channel == Channel::Duty { duty } else { 0.0 };
+            let value = plant.channel(config, *channel).unwrap_or(outside);
             let mut port = SensorPort { t_s, dt_s, value };
             self.effects.measure(*channel, states, &mut port);
             values.push(port.value);

@@ -9,6 +9,7 @@
 
 use libm::{sin, sqrt};
 
+use crate::channel::Channel;
 use crate::drive::{
     BridgeInput, after_dry_friction_rad_s, current_after_a, pulley_inertia_kg_m2,
     pulley_torque_constant_nm_per_a,
@@ -642,6 +643,25 @@ impl Plant {
         self.theta_motor_rad = theta_rad;
         self.theta_in_rad = theta_rad;
         self.theta_out_rad = theta_rad;
+    }
+
+    /// True value of a channel of the joint; `None` for what comes from outside it (reference, duty, supply, enable).
+    #[must_use]
+    pub fn channel(&self, config: &PlantConfig, channel: Channel) -> Option<f64> {
+        let [f1, f2, f3, f4] = self.end_tensions_n(config);
+        match channel {
+            Channel::ThetaMotor => Some(self.theta_motor_rad),
+            Channel::ThetaIn => Some(self.theta_in_rad),
+            Channel::ThetaOut => Some(self.theta_out_rad),
+            Channel::F1 => Some(f1),
+            Channel::F2 => Some(f2),
+            Channel::F3 => Some(f3),
+            Channel::F4 => Some(f4),
+            Channel::TorqueIn => Some(self.driving_torque_nm(config)),
+            Channel::TorqueOut => Some(self.torque_out_nm(config)),
+            Channel::MotorCurrent => Some(self.current_a),
+            Channel::ThetaRef | Channel::Duty | Channel::BusVoltage | Channel::DriveEnable => None,
+        }
     }
 
     /// F1 to F4, N; zero without tendons.

@@ -47,24 +47,15 @@ impl Sensors {
         bridge: BridgeInput,
     ) -> Vec<f64> {
         let dt_s = t_s - self.last_s.replace(t_s).unwrap_or(t_s);
-        let [f1, f2, f3, f4] = plant.end_tensions_n(config);
         let parameters = self.parameters;
         let read = |sensor: &mut Sensor| {
-            let value = match sensor.channel {
-                Channel::ThetaRef => return reference_rad,
-                Channel::Duty => return bridge.duty,
-                Channel::BusVoltage => return bridge.bus_v,
-                Channel::DriveEnable => return f64::from(u8::from(bridge.enabled)),
-                Channel::ThetaMotor => plant.theta_motor_rad(),
-                Channel::ThetaIn => plant.theta_in_rad(),
-                Channel::ThetaOut => plant.theta_out_rad(),
-                Channel::F1 => f1,
-                Channel::F2 => f2,
-                Channel::F3 => f3,
-                Channel::F4 => f4,
-                Channel::TorqueIn => plant.driving_torque_nm(config),
-                Channel::TorqueOut => plant.torque_out_nm(config),
-                Channel::MotorCurrent => plant.current_a(),
+            let Some(value) = plant.channel(config, sensor.channel) else {
+                return match sensor.channel {
+                    Channel::ThetaRef => reference_rad,
+                    Channel::Duty => bridge.duty,
+                    Channel::BusVoltage => bridge.bus_v,
+                    _ => f64::from(u8::from(bridge.enabled)),
+                };
             };
             let mut port = SensorPort { t_s, dt_s, value };
             config.effects().measure(sensor.channel, &mut sensor.states, &mut port);
