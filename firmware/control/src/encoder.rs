@@ -1,13 +1,17 @@
 //! Absolute encoders: what a frame says, whether it can be believed, and the angle over more than one turn.
 //!
-//! A driver consists of a [`FrameBus`], which a board implements for its pins, and of a decoder that uses every error
-//! bit of the frame: [`amt22`] and [`as5045`]. Counts stay raw integers here; radians belong to the edge of the program.
+//! A part is a [`FrameDecoder`] that uses every error bit of its frame: [`amt22`] and [`as5045`], chosen at run time by
+//! [`Part`]. [`channel`] follows one encoder from tick to tick, [`stuck`] compares the two.
 
 pub mod amt22;
 pub mod as5045;
+pub mod channel;
 pub mod multi_turn;
+pub mod stuck;
 
-use core::fmt;
+use bowden_link::Fault;
+
+pub use channel::{EncoderChannel, EncoderConfig, Observation};
 
 /// Position within one turn of a 12-bit encoder, counts from 0 to 4095.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -35,67 +39,58 @@ impl CountRaw {
     }
 }
 
-/// Serial transfer of one frame, most significant bit first.
-///
-/// # Contract
-/// One call is one chip-select cycle with exactly `bits` clocks and the pauses that the encoder's data sheet asks for.
-/// The frame is returned right-aligned with all higher bits zero. Nothing is sent to the encoder but zeros.
-pub trait FrameBus {
-    /// Why a transfer failed.
-    type Error;
-
-    /// Transfers one frame of `bits` bits, at most 32.
-    ///
-    /// # Errors
-    /// When the peripheral reports one, or the transfer does not end in time.
-    fn transfer(&mut self, bits: u8) -> Result<u32, Self::Error>;
-}
-
-/// An encoder that knows its angle within a turn.
-pub trait AbsoluteEncoder {
-    /// What an encoder tells beside its count.
-    type Health;
-    /// What is wrong with a frame.
-    type Fault;
-    /// Why a transfer failed.
-    type BusError;
-
-    /// Reads the present position.
-    ///
-    /// # Errors
-    /// When the transfer failed, or any check of the frame did: no count of a doubtful frame is ever returned.
-    fn read(&mut self) -> ReadResult<Self>;
-}
-
-/// What reading an encoder gives.
-pub type ReadResult<E> = Result<
-    Reading<<E as AbsoluteEncoder>::Health>,
-    ReadError<<E as AbsoluteEncoder>::Fault, <E as AbsoluteEncoder>::BusError>,
->;
-
 /// A position that passed all checks of its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reading<H> {
+pub struct Reading {
     /// Position within the turn.
     pub count_raw: CountRaw,
-    /// What the encoder says on itself.
-    pub health: H,
+    /// The encoder says that its magnet is at the edge of its range.
+    pub marginal: bool,
 }
 
-/// Why there is no position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReadError<F, B> {
-    /// A frame came and does not hold.
-    Frame(F),
-    /// No frame came.
-    Bus(B),
+/// A kind of encoder.
+pub trait FrameDecoder {
+    /// What is wrong with a frame.
+    type Fault: Into<Fault>;
+
+    /// Clocks of a frame.
+    const FRAME_BITS: u8;
+
+    /// Position in a frame, right-aligned; bits above [`Self::FRAME_BITS`] are not looked at.
+    ///
+    /// # Errors
+    /// When any check of the frame fails: no count of a doubtful frame is ever returned.
+    fn decode(frame_raw: u32) -> Result<Reading, Self::Fault>;
 }
 
-impl<F: fmt::Display, B: fmt::Display> fmt::Display for ReadError<F, B> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+/// The parts that can be chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Part {
+    /// AMT22, 12-bit type, SPI.
+    #[default]
+    Amt22,
+    /// AS5045, SSI.
+    As5045,
+}
+
+impl Part {
+    /// Clocks of a frame.
+    #[must_use]
+    pub const fn frame_bits(self) -> u8 {
         match self {
-            Self::Frame(fault) => fault.fmt(f),
-            Self::Bus(error) => write!(f, "encoder bus: {error}"),
+            Self::Amt22 => amt22::Amt22::FRAME_BITS,
+            Self::As5045 => as5045::As5045::FRAME_BITS,
+        }
+    }
+
+    /// Position in a frame of this part.
+    ///
+    /// # Errors
+    /// [`Fault::EncoderCheck`], [`Fault::EncoderParity`] or [`Fault::EncoderStatus`].
+    pub fn decode(self, frame_raw: u32) -> Result<Reading, Fault> {
+        match self {
+            Self::Amt22 => amt22::Amt22::decode(frame_raw).map_err(Into::into),
+            Self::As5045 => as5045::As5045::decode(frame_raw).map_err(Into::into),
         }
     }
 }

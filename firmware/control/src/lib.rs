@@ -1,7 +1,37 @@
-//! Driver board of one joint: the parts that need no hardware, so that they run and are tested on any machine.
+//! Control of one joint for the driver board, without hardware: the same code, bit for bit, on the board and on any
+//! other machine.
 //!
-//! There is no image for the board yet; `README.md` of this crate says what exists and what does not.
+//! | module | what |
+//! |---|---|
+//! | [`controller`] | one control tick: [`tick::TickInput`] in, [`tick::TickOutput`] out |
+//! | [`scale`] | fixed-point quantities and gains |
+//! | [`encoder`], [`tension`], [`supply`] | sensors, and whether they can be believed |
+//! | [`mod@reference`] | where the joint is to be |
+//! | [`compensator`] | where the input pulley has to be for that |
+//! | [`observer`], [`drive`] | how the motor gets it there |
+//! | [`supervisor`] | states, and which fault counts in which |
+//! | [`parameters`] | everything that can be set, in SI units |
+//! | [`snapshot`] | the last ticks before a fault |
+//! | [`conformance`] | a digest over many ticks, to compare machines |
+//!
+//! `README.md` has the signal flow, the table of scales and the table of faults.
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod compensator;
+pub mod conformance;
+pub mod controller;
+pub mod drive;
 pub mod encoder;
+pub mod observer;
+pub mod parameters;
+pub mod reference;
+pub mod scale;
+pub mod service;
+pub mod snapshot;
+pub mod supervisor;
+pub mod supply;
+pub mod tension;
+pub mod tick;
+
+pub use parameters::{reference_config, tick_config};

@@ -7,7 +7,7 @@
 
 use core::fmt;
 
-use super::{AbsoluteEncoder, CountRaw, FrameBus, ReadError, ReadResult, Reading};
+use super::{CountRaw, FrameDecoder, Reading};
 
 /// Bits of a frame.
 pub const FRAME_BITS: u8 = 16;
@@ -80,29 +80,28 @@ pub const fn decode(frame_raw: u16) -> Result<CountRaw, Fault> {
     Ok(CountRaw::from_low_bits((frame_raw >> BELOW_POSITION) as u32))
 }
 
-/// An AMT22 behind a bus.
-#[derive(Debug)]
-pub struct Amt22<B> {
-    bus: B,
-}
+/// The decoder.
+#[derive(Clone, Copy, Debug)]
+pub struct Amt22;
 
-impl<B> Amt22<B> {
-    /// The encoder that `bus` leads to.
-    pub const fn new(bus: B) -> Self {
-        Self { bus }
+impl FrameDecoder for Amt22 {
+    type Fault = Fault;
+
+    const FRAME_BITS: u8 = FRAME_BITS;
+
+    /// This type tells nothing beside its position.
+    fn decode(frame_raw: u32) -> Result<Reading, Fault> {
+        decode((frame_raw & 0xffff) as u16).map(|count_raw| Reading { count_raw, marginal: false })
     }
 }
 
-impl<B: FrameBus> AbsoluteEncoder for Amt22<B> {
-    /// This type tells nothing beside its position.
-    type Health = ();
-    type Fault = Fault;
-    type BusError = B::Error;
-
-    fn read(&mut self) -> ReadResult<Self> {
-        let frame_raw = self.bus.transfer(FRAME_BITS).map_err(ReadError::Bus)?;
-        let count_raw = decode((frame_raw & 0xffff) as u16).map_err(ReadError::Frame)?;
-        Ok(Reading { count_raw, health: () })
+impl From<Fault> for bowden_link::Fault {
+    /// A 14-bit encoder in place of a 12-bit one counts as its status: it works and its angle does not hold.
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Check { .. } => Self::EncoderCheck,
+            Fault::Resolution { .. } => Self::EncoderStatus,
+        }
     }
 }
 
@@ -160,23 +159,12 @@ mod tests {
         assert_eq!(accepted, 4096);
     }
 
-    /// A bus with one answer, strict on the length of a frame.
-    struct One(Result<u32, &'static str>);
-
-    impl FrameBus for One {
-        type Error = &'static str;
-
-        fn transfer(&mut self, bits: u8) -> Result<u32, &'static str> {
-            assert_eq!(bits, 16, "an AMT22 frame has 16 clocks");
-            self.0
-        }
-    }
-
     #[test]
-    fn errors_of_bus_and_frame_stay_apart() {
-        let read = |answer| Amt22::new(One(answer)).read().map(|reading| reading.count_raw.get());
-        assert_eq!(read(Ok(0x6af0)), Ok(0xabc));
-        assert_eq!(read(Err("timeout")), Err(ReadError::Bus("timeout")));
-        assert!(matches!(read(Ok(0x6af1)), Err(ReadError::Frame(Fault::Check { .. }))));
+    fn bits_above_the_frame_are_not_looked_at() {
+        assert_eq!(Amt22::decode(0xdead_6af0).map(|reading| reading.count_raw.get()), Ok(0xabc));
+        let fault = Amt22::decode(0x6af1).unwrap_err();
+        assert_eq!(bowden_link::Fault::from(fault), bowden_link::Fault::EncoderCheck);
+        let fault = Amt22::decode(0x61ab).unwrap_err();
+        assert_eq!(bowden_link::Fault::from(fault), bowden_link::Fault::EncoderStatus);
     }
 }

@@ -12,7 +12,7 @@
 
 use core::fmt;
 
-use super::{AbsoluteEncoder, CountRaw, FrameBus, ReadError, ReadResult, Reading};
+use super::{CountRaw, FrameDecoder, Reading};
 
 /// Bits of a frame.
 pub const FRAME_BITS: u8 = 18;
@@ -77,7 +77,7 @@ impl fmt::Display for Fault {
 ///
 /// # Errors
 /// [`Fault`] when the parity or one of the status bits says that the position does not hold.
-pub const fn decode(frame_raw: u32) -> Result<Reading<Field>, Fault> {
+pub const fn decode(frame_raw: u32) -> Result<(CountRaw, Field), Fault> {
     let frame_raw = frame_raw & FRAME;
     if frame_raw.count_ones() % 2 == 1 {
         return Err(Fault::Parity { frame_raw });
@@ -97,30 +97,30 @@ pub const fn decode(frame_raw: u32) -> Result<Reading<Field>, Fault> {
         (false, true) => Field::Falling,
         (true, true) => Field::Marginal,
     };
-    Ok(Reading { count_raw: CountRaw::from_low_bits(frame_raw >> BELOW_POSITION), health })
+    Ok((CountRaw::from_low_bits(frame_raw >> BELOW_POSITION), health))
 }
 
-/// An AS5045 behind a bus.
-#[derive(Debug)]
-pub struct As5045<B> {
-    bus: B,
-}
+/// The decoder.
+#[derive(Clone, Copy, Debug)]
+pub struct As5045;
 
-impl<B> As5045<B> {
-    /// The encoder that `bus` leads to.
-    pub const fn new(bus: B) -> Self {
-        Self { bus }
+impl FrameDecoder for As5045 {
+    type Fault = Fault;
+
+    const FRAME_BITS: u8 = FRAME_BITS;
+
+    fn decode(frame_raw: u32) -> Result<Reading, Fault> {
+        decode(frame_raw)
+            .map(|(count_raw, field)| Reading { count_raw, marginal: matches!(field, Field::Marginal) })
     }
 }
 
-impl<B: FrameBus> AbsoluteEncoder for As5045<B> {
-    type Health = Field;
-    type Fault = Fault;
-    type BusError = B::Error;
-
-    fn read(&mut self) -> ReadResult<Self> {
-        let frame_raw = self.bus.transfer(FRAME_BITS).map_err(ReadError::Bus)?;
-        decode(frame_raw).map_err(ReadError::Frame)
+impl From<Fault> for bowden_link::Fault {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Parity { .. } => Self::EncoderParity,
+            Fault::NotReady | Fault::Overflow | Fault::Linearity => Self::EncoderStatus,
+        }
     }
 }
 
@@ -145,8 +145,8 @@ mod tests {
     #[test]
     fn every_position_comes_back() {
         for count in 0..4096 {
-            let reading = decode(frame(count, GOOD)).unwrap();
-            assert_eq!((u32::from(reading.count_raw.get()), reading.health), (count, Field::Steady));
+            let (count_raw, field) = decode(frame(count, GOOD)).unwrap();
+            assert_eq!((u32::from(count_raw.get()), field), (count, Field::Steady));
         }
     }
 
@@ -154,7 +154,7 @@ mod tests {
     fn frames_worked_by_hand() {
         // Position and OCF are ones; parity makes their number even.
         for (frame_raw, count) in [(0x21, 0), (0x60, 1), (0xe1, 3), (0x2_0020, 0x800), (0x3_ffe1, 0xfff)] {
-            assert_eq!(decode(frame_raw).map(|reading| reading.count_raw.get()), Ok(count), "{frame_raw:#x}");
+            assert_eq!(decode(frame_raw).map(|(count_raw, _)| count_raw.get()), Ok(count), "{frame_raw:#x}");
         }
     }
 
@@ -163,7 +163,7 @@ mod tests {
         for status in 0..32_u8 {
             let bits: [bool; 5] = core::array::from_fn(|n| status >> (4 - n) & 1 == 1);
             let [ready, overflow, linearity, increase, decrease] = bits;
-            let told = decode(frame(0x123, bits)).map(|reading| reading.health);
+            let told = decode(frame(0x123, bits)).map(|(_, field)| field);
             let expected = match (ready, overflow, linearity, increase, decrease) {
                 (false, ..) => Err(Fault::NotReady),
                 (true, true, ..) => Err(Fault::Overflow),
@@ -197,23 +197,17 @@ mod tests {
         assert_eq!(decode(0x3_ffff), Err(Fault::Overflow));
     }
 
-    /// A bus with one answer, strict on the length of a frame.
-    struct One(Result<u32, &'static str>);
-
-    impl FrameBus for One {
-        type Error = &'static str;
-
-        fn transfer(&mut self, bits: u8) -> Result<u32, &'static str> {
-            assert_eq!(bits, 18, "an AS5045 frame has 18 clocks");
-            self.0
-        }
-    }
-
     #[test]
-    fn errors_of_bus_and_frame_stay_apart() {
-        let read = |answer| As5045::new(One(answer)).read().map(|reading| reading.count_raw.get());
-        assert_eq!(read(Ok(0x60)), Ok(1));
-        assert_eq!(read(Err("timeout")), Err(ReadError::Bus("timeout")));
-        assert_eq!(read(Ok(0x61)), Err(ReadError::Frame(Fault::Parity { frame_raw: 0x61 })));
+    fn bits_above_the_frame_are_not_looked_at() {
+        let marginal = As5045::decode(0xfffc_0000 | frame(7, [true, false, false, true, true]));
+        assert_eq!(marginal.map(|reading| (reading.count_raw.get(), reading.marginal)), Ok((7, true)));
+        assert_eq!(
+            bowden_link::Fault::from(As5045::decode(0x61).unwrap_err()),
+            bowden_link::Fault::EncoderParity
+        );
+        assert_eq!(
+            bowden_link::Fault::from(As5045::decode(0).unwrap_err()),
+            bowden_link::Fault::EncoderStatus
+        );
     }
 }

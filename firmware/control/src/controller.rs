@@ -1,0 +1,315 @@
+//! One control tick: sensors, supervision, reference, compensator, loop, duty.
+//!
+//! The tick has no float but for the numbers of a fault that it just found, no allocation, no lock and no loop whose length
+//! depends on data. A detection switches the bridge off in the very tick.
+
+use bowden_link::message::Mode;
+use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
+
+use crate::compensator::{CompensatorInput, CompensatorState, compensate};
+use crate::drive::{Loops, PositionInput, TorqueInput};
+use crate::encoder::EncoderChannel;
+use crate::encoder::stuck::StuckWatch;
+use crate::observer::{Motion, Observer};
+use crate::reference::{Origin, ReferenceConfig, ReferenceOutput, ReferenceState};
+use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
+use crate::supervisor::{Detection, Situation, Supervisor};
+use crate::supply::Supply;
+use crate::tension::TensionChannels;
+use crate::tick::{Command, Inbox, TickConfig, TickInput, TickOutput};
+
+/// Control of one joint.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    config: TickConfig,
+    supervisor: Supervisor,
+    encoders: [EncoderChannel; 2],
+    stuck: StuckWatch,
+    tensions: TensionChannels,
+    supply: Supply,
+    observer: Observer,
+    reference: ReferenceState,
+    /// Reference that was set with the bridge off.
+    waiting: Option<ReferenceConfig>,
+    /// The bridge goes on in this tick.
+    starts: bool,
+    compensator: CompensatorState,
+    loops: Loops,
+    limits: Limits,
+    ticks: u32,
+}
+
+/// What the sensors say in a tick.
+struct Readings {
+    counts: [i32; 2],
+    theta: [Angle; 2],
+    motion: Motion,
+    tensions: [Tension; 4],
+    torque_in: Torque,
+    torque_out: Torque,
+    current: Current,
+    bus: Voltage,
+    found: Option<Detection>,
+}
+
+/// What the joint is to do in a tick.
+#[derive(Default)]
+struct Action {
+    duty_raw: i16,
+    reference_raw: i32,
+    command: Angle,
+}
+
+impl Controller {
+    /// A joint that has just been switched on.
+    #[must_use]
+    pub fn new(config: TickConfig) -> Self {
+        Self {
+            config,
+            supervisor: Supervisor::default(),
+            encoders: [EncoderChannel::default(); 2],
+            stuck: StuckWatch::default(),
+            tensions: TensionChannels::default(),
+            supply: Supply::default(),
+            observer: Observer::default(),
+            reference: ReferenceState::default(),
+            waiting: None,
+            starts: false,
+            compensator: CompensatorState::default(),
+            loops: Loops::default(),
+            limits: Limits(0),
+            ticks: 0,
+        }
+    }
+
+    /// One tick.
+    pub fn tick(&mut self, input: &TickInput, inbox: &mut impl Inbox) -> TickOutput {
+        let tick = self.ticks;
+        self.ticks = tick.wrapping_add(1);
+        let mut limits = Limits::default();
+        let ordered = inbox.command().and_then(|command| self.take(&command));
+        let readings = self.sense(input, &mut limits);
+        let mut found = ordered.or(readings.found);
+        if found.is_none() {
+            let situation = Situation {
+                tension_raw: input.tension_raw,
+                tensions: readings.tensions,
+                counts: readings.counts,
+                current: readings.current,
+                theta_out: readings.theta[1],
+                arrived: !self.starts && self.reference.value_bits() == 0,
+            };
+            found = self.supervisor.step(&self.config.supervisor, &situation);
+        }
+        let tripped = found.and_then(|found| self.supervisor.trip(found, tick));
+        let state = self.supervisor.state();
+        let action = if state.drives() {
+            self.drive(&readings, inbox, &mut limits)
+        } else {
+            self.stuck.reset();
+            self.starts = false;
+            // Points that a run left behind are not followed by the next one; one a tick, so that the tick stays short.
+            let _ = inbox.stream_point();
+            Action::default()
+        };
+        self.limits = limits;
+        let sample = Sample {
+            encoder_count_raw: readings.counts,
+            tension_raw: input.tension_raw,
+            current_raw: input.current_raw,
+            bus_raw: input.bus_raw,
+            duty_raw: action.duty_raw,
+            reference_raw: action.reference_raw,
+            command_raw: action.command.to_bits(),
+            state,
+            limits,
+        };
+        TickOutput { duty_raw: action.duty_raw, bridge_on: state.drives(), sample, tripped }
+    }
+
+    fn take(&mut self, command: &Command) -> Option<Detection> {
+        match command {
+            Command::Configure(config) => {
+                let driving = self.supervisor.state().drives();
+                for ((channel, old), new) in
+                    self.encoders.iter_mut().zip(&self.config.encoder).zip(&config.encoder)
+                {
+                    // Another zero or part means another turn to start in.
+                    if old != new && !driving {
+                        *channel = EncoderChannel::default();
+                        self.observer = Observer::default();
+                    }
+                }
+                self.config = *config;
+                None
+            }
+            Command::Enter(goal) => {
+                if self.supervisor.enter(*goal) {
+                    self.starts = self.supervisor.state().drives();
+                }
+                None
+            }
+            Command::SetReference(reference) => {
+                match self.supervisor.state() {
+                    State::Run if !self.starts => self.reference.follow(*reference),
+                    _ => self.waiting = Some(*reference),
+                }
+                None
+            }
+            &Command::Trip(fault, channel, got, limit) => Some(Detection { fault, channel, got, limit }),
+        }
+    }
+
+    fn sense(&mut self, input: &TickInput, limits: &mut Limits) -> Readings {
+        let config = &self.config;
+        let observed = [0, 1].map(|n: usize| self.encoders[n].observe(&config.encoder[n], &input.encoder[n]));
+        let counts = observed.map(|encoder| encoder.position_counts);
+        let theta = observed.map(|encoder| encoder.angle);
+        if observed.iter().any(|encoder| encoder.repaired) {
+            limits.insert(Limit::FrameRepaired);
+        }
+        if observed.iter().any(|encoder| encoder.marginal) {
+            limits.insert(Limit::MagnetMarginal);
+        }
+        let tensions = config.tension.tensions(input.tension_raw);
+        let [f1, f2, f3, f4] = tensions;
+        let torque_in = config.input_radius.apply(f1.minus(f3));
+        let torque_out = config.output_radius.apply(f2.minus(f4));
+        let supply = self.supply.observe(&config.supply, input.current_raw, input.bus_raw);
+        let motion = self.observer.observe(
+            &config.observer,
+            theta[0],
+            !observed[0].repaired,
+            supply.current,
+            torque_in,
+        );
+        let checks = self.supervisor.tension_checks();
+        let tension = self.tensions.watch(&config.tension, checks, input.tension_raw, tensions);
+        let found = if self.supervisor.watches() {
+            let bridge =
+                input.bridge_fault.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
+            let encoder = (0..2)
+                .find_map(|n| observed[n].fault.map(|bad| Detection::new(bad.fault, n, bad.got, bad.limit)));
+            bridge.or(supply.found).or(encoder).or(tension).or_else(|| self.stand_still(counts))
+        } else {
+            None
+        };
+        let (current, bus) = (supply.current, supply.bus_filtered);
+        Readings { counts, theta, motion, tensions, torque_in, torque_out, current, bus, found }
+    }
+
+    fn stand_still(&mut self, counts: [i32; 2]) -> Option<Detection> {
+        if !self.supervisor.state().drives() {
+            return None;
+        }
+        let (config, encoders) = (&self.config.stuck, &self.config.encoder);
+        let (channel, travel) = self.stuck.observe(config, encoders, counts)?;
+        Some(Detection {
+            fault: bowden_link::Fault::EncoderStuck,
+            channel,
+            got: travel.to_f32(),
+            limit: config.travel.to_f32(),
+        })
+    }
+
+    fn drive(&mut self, readings: &Readings, inbox: &mut impl Inbox, limits: &mut Limits) -> Action {
+        let homing = self.supervisor.state() == State::Homing;
+        let torque_mode = self.supervisor.mode() == Mode::Torque;
+        let mut compensation = CompensatorInput {
+            theta_d: readings.theta[1],
+            torque_out: readings.torque_out,
+            theta_in: readings.theta[0],
+            theta_out: readings.theta[1],
+            ..CompensatorInput::default()
+        };
+        if self.starts {
+            self.starts = false;
+            let here = if torque_mode { readings.torque_out.to_bits() } else { readings.theta[1].to_bits() };
+            self.reference = ReferenceState::standing_at(here);
+            if homing {
+                let origin = Origin::Hold(0);
+                self.reference.follow(ReferenceConfig { origin, ramp_step: u32::MAX });
+            } else if let Some(waiting) = self.waiting.take() {
+                self.reference.follow(waiting);
+            }
+            self.compensator = CompensatorState::starting_at(&self.config.compensator, &compensation);
+            self.loops = Loops::default();
+        }
+        let config = &self.config;
+        let bounds = match (homing, torque_mode) {
+            (true, _) => &config.homing_bounds,
+            (false, false) => &config.angle_bounds,
+            (false, true) => &config.torque_bounds,
+        };
+        let reference = self.reference.step(bounds, inbox, limits);
+        let (torque, command) = if torque_mode {
+            (Self::torque(config, &mut self.loops, readings, &reference, limits), readings.theta[0])
+        } else {
+            compensation.theta_d = Angle::from_bits(reference.value_bits);
+            compensation.omega_d = reference.speed(config.rate_hz);
+            let compensated = compensate(&config.compensator, &mut self.compensator, &compensation);
+            if compensated.limited {
+                limits.insert(Limit::Compensation);
+            }
+            let position = PositionInput {
+                command: compensated.theta_c,
+                command_speed: config.speed_ratio.apply(compensation.omega_d),
+                acceleration: reference.acceleration(config.rate_hz),
+                measured: readings.theta[0],
+                motion: readings.motion,
+                torque_in: readings.torque_in,
+            };
+            (self.loops.position(&config.position, &config.drive, &position, limits), compensated.theta_c)
+        };
+        let duty_raw = self.loops.duty(&config.drive, torque, readings.motion.speed, readings.bus, limits);
+        Action { duty_raw, reference_raw: reference.value_bits, command }
+    }
+
+    fn torque(
+        config: &TickConfig,
+        loops: &mut Loops,
+        readings: &Readings,
+        reference: &ReferenceOutput,
+        limits: &mut Limits,
+    ) -> Torque {
+        let mut wanted = Torque::from_bits(reference.value_bits);
+        // A free joint would run away under a torque; it is not pushed out of its range.
+        let [low, high] = config.angle_bounds.range.map(Angle::from_bits);
+        let theta = readings.theta[1];
+        if (theta > high && wanted > Torque::ZERO) || (theta < low && wanted < Torque::ZERO) {
+            wanted = Torque::ZERO;
+            limits.insert(Limit::ReferenceRange);
+        }
+        let input = TorqueInput {
+            wanted,
+            rate_sign: reference.change.signum() as i32,
+            measured: readings.torque_out,
+            speed: readings.motion.speed,
+        };
+        loops.torque(&config.torque, &config.drive, &input, limits)
+    }
+
+    /// State of the supervisor.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.supervisor.state()
+    }
+
+    /// Fault that waits to be cleared.
+    #[must_use]
+    pub const fn fault(&self) -> Option<FaultRecord> {
+        self.supervisor.fault()
+    }
+
+    /// Limits that acted in the last tick.
+    #[must_use]
+    pub const fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    /// Ticks done since boot.
+    #[must_use]
+    pub const fn tick_count(&self) -> u32 {
+        self.ticks
+    }
+}

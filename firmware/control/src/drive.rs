@@ -1,0 +1,308 @@
+//! From angle or torque to the duty of the bridge.
+//!
+//! Both loops end in a torque at the input pulley, `τ`; from there
+//!
+//! `i = τ / (k_t N)`, within the current limit (flag [`Limit::Current`]); `v = R i + k_e N ω` with the observer's speed, so
+//! that the current is limited by the model of the winding, without a current loop; `duty = v / v_bus`, within
+//! the duty limit (flag [`Limit::Duty`]).
+//!
+//! | loop | law |
+//! |---|---|
+//! | position | `τ = J (k_p e + k_i ∫e dt + k_d (ω_c − ω) + α_c) + b ω + g (F1 − F3) r1`, `e = θ_c − θ`; `k_p = ω_n²`, `k_d = 2ζω_n`, `k_i = k_p/T_i` |
+//! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + k (e + ∫e dt/T_i) − d ω`, `e = (r1/r2)(T_d − T_out)`, s the low-passed sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) |
+//!
+//! The measured input torque is fed forward, so the position loop sees the rotor alone, whatever weight and friction do.
+//! The integral rests (flag [`Limit::Integrator`]) while current or duty are at their limit and the error would push
+//! further, and while the count does not tell an error.
+
+use bowden_link::{Limit, Limits};
+
+use crate::observer::Motion;
+use crate::scale::{Acceleration, Angle, Current, Gain, Quantity, Speed, Sum, Torque, Voltage, Weight};
+
+/// Motor, gear and bridge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveConfig {
+    /// `1 / (k_t N)`.
+    pub current_per_torque: Gain<Torque, Current>,
+    /// Viscous friction `b` at the input pulley.
+    pub viscous: Gain<Speed, Torque>,
+    /// Winding resistance R.
+    pub resistance: Gain<Current, Voltage>,
+    /// `k_e N`.
+    pub back_emf: Gain<Speed, Voltage>,
+    /// Current that is never asked for.
+    pub current_limit: Current,
+    /// Largest duty, 1/32767.
+    pub duty_limit_raw: i16,
+    /// Positive duty turns towards -θ.
+    pub reversed: bool,
+}
+
+/// Gains of the position loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionConfig {
+    /// `k_p`.
+    pub proportional: Gain<Angle, Acceleration>,
+    /// `k_d`.
+    pub derivative: Gain<Speed, Acceleration>,
+    /// `k_i` a tick.
+    pub integral: Weight<Angle, Acceleration>,
+    /// Rotor inertia J at the input pulley.
+    pub inertia: Gain<Acceleration, Torque>,
+    /// Part of the reference's acceleration that is fed forward, at the input pulley.
+    pub acceleration_feedforward: Gain<Acceleration, Acceleration>,
+    /// Low-pass of it: corners of the reference would jerk the tendons.
+    pub acceleration_filter: Weight<Acceleration, Acceleration>,
+    /// Part of the input torque that is fed forward.
+    pub load_feedforward: Gain<Torque, Torque>,
+    /// Half a count.
+    pub half_count: Angle,
+}
+
+/// Gains of the torque loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueConfig {
+    /// `r1/r2`.
+    pub at_input: Gain<Torque, Torque>,
+    /// `k`.
+    pub proportional: Gain<Torque, Torque>,
+    /// `k/T_i` a tick.
+    pub integral: Weight<Torque, Torque>,
+    /// `d`.
+    pub damping: Gain<Speed, Torque>,
+    /// `g M`.
+    pub friction: Torque,
+    /// Low-pass of its sign.
+    pub friction_filter: Weight<Torque, Torque>,
+}
+
+/// State of both loops.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Loops {
+    acceleration: Sum<Acceleration>,
+    feedforward: Sum<Acceleration>,
+    torque: Sum<Torque>,
+    friction: Sum<Torque>,
+    friction_target: Torque,
+    /// Sign of the output that was at a limit in the last tick, 0 if none was.
+    saturated: i8,
+}
+
+/// What the position loop follows and sees.
+#[derive(Clone, Copy, Debug)]
+pub struct PositionInput {
+    /// Angle that the input pulley is to take.
+    pub command: Angle,
+    /// Speed that it is to take.
+    pub command_speed: Speed,
+    /// Acceleration of the joint's reference.
+    pub acceleration: Acceleration,
+    /// Angle of the encoder's count.
+    pub measured: Angle,
+    /// Observed angle and speed.
+    pub motion: Motion,
+    /// Measured input torque `(F1 - F3) r1`.
+    pub torque_in: Torque,
+}
+
+/// What the torque loop follows and sees.
+#[derive(Clone, Copy, Debug)]
+pub struct TorqueInput {
+    /// Output torque that is asked for.
+    pub wanted: Torque,
+    /// Sign of its rate.
+    pub rate_sign: i32,
+    /// Measured output torque `(F2 - F4) r2`.
+    pub measured: Torque,
+    /// Observed speed of the input pulley.
+    pub speed: Speed,
+}
+
+impl Loops {
+    /// Whether an integral may take an error of this sign; sets the flag if not.
+    fn may_integrate(&self, error_bits: i32, limits: &mut Limits) -> bool {
+        let pushes = (self.saturated > 0 && error_bits > 0) || (self.saturated < 0 && error_bits < 0);
+        if pushes {
+            limits.insert(Limit::Integrator);
+        }
+        !pushes
+    }
+
+    /// Torque for the input pulley that the position loop asks for.
+    pub fn position(
+        &mut self,
+        config: &PositionConfig,
+        drive: &DriveConfig,
+        input: &PositionInput,
+        limits: &mut Limits,
+    ) -> Torque {
+        let error = input.command.minus(input.motion.angle);
+        let told = input.command.minus(input.measured).magnitude() > config.half_count;
+        if told && self.may_integrate(error.to_bits(), limits) {
+            self.acceleration.add(config.integral, error);
+        }
+        let wanted = config.acceleration_feedforward.apply(input.acceleration);
+        let wanted = self.feedforward.approach(config.acceleration_filter, wanted);
+        let speed_error = input.command_speed.minus(input.motion.speed);
+        let acceleration = config
+            .proportional
+            .apply(error)
+            .plus(config.derivative.apply(speed_error))
+            .plus(self.acceleration.value())
+            .plus(wanted);
+        config
+            .inertia
+            .apply(acceleration)
+            .plus(drive.viscous.apply(input.motion.speed))
+            .plus(config.load_feedforward.apply(input.torque_in))
+    }
+
+    /// Torque for the input pulley that the torque loop asks for.
+    pub fn torque(
+        &mut self,
+        config: &TorqueConfig,
+        drive: &DriveConfig,
+        input: &TorqueInput,
+        limits: &mut Limits,
+    ) -> Torque {
+        let TorqueInput { wanted, rate_sign, measured, speed } = *input;
+        match rate_sign {
+            1.. => self.friction_target = config.friction,
+            0 => {}
+            _ => self.friction_target = config.friction.negated(),
+        }
+        let friction = self.friction.approach(config.friction_filter, self.friction_target);
+        let error = config.at_input.apply(wanted.minus(measured));
+        if self.may_integrate(error.to_bits(), limits) {
+            self.torque.add(config.integral, error);
+        }
+        config
+            .at_input
+            .apply(wanted.plus(friction))
+            .plus(config.proportional.apply(error))
+            .plus(self.torque.value())
+            .plus(drive.viscous.apply(speed))
+            .minus(config.damping.apply(speed))
+    }
+
+    /// Duty that makes this torque, 1/32767, within all limits.
+    pub fn duty(
+        &mut self,
+        config: &DriveConfig,
+        torque: Torque,
+        speed: Speed,
+        bus: Voltage,
+        limits: &mut Limits,
+    ) -> i16 {
+        /// Bits of a voltage that are dropped ahead of the division: 1 mV is left.
+        const DROPPED: u32 = 10;
+        /// 1 V to 63 V in what is left, so that the product with 32767 fits 32 bits.
+        const BUS_RANGE: (i32, i32) = (1 << 10, 63 << 10);
+        let wanted = config.current_per_torque.apply(torque);
+        let current = wanted.limited(config.current_limit);
+        let mut saturated = wanted != current;
+        if saturated {
+            limits.insert(Limit::Current);
+        }
+        let voltage = config.resistance.apply(current).plus(config.back_emf.apply(speed));
+        let bus_mv = (bus.to_bits() >> DROPPED).max(BUS_RANGE.0).min(BUS_RANGE.1);
+        let voltage_mv = (voltage.to_bits() >> DROPPED).max(-bus_mv).min(bus_mv);
+        let full = voltage_mv * i32::from(i16::MAX) / bus_mv;
+        let limit = i32::from(config.duty_limit_raw);
+        let duty = full.max(-limit).min(limit);
+        if duty != full {
+            saturated = true;
+            limits.insert(Limit::Duty);
+        }
+        self.saturated = if saturated { torque.to_bits().signum() as i8 } else { 0 };
+        let duty = duty as i16;
+        if config.reversed { -duty } else { duty }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::Parameters;
+    use crate::tick::TickConfig;
+    use crate::tick_config;
+
+    fn config() -> TickConfig {
+        tick_config(&Parameters::default()).unwrap()
+    }
+
+    fn duty(config: &DriveConfig, torque_nm: f32, speed_rad_s: f32, bus_v: f32) -> (i16, Limits) {
+        let mut limits = Limits::default();
+        let (torque, speed) = (Torque::from_f32(torque_nm), Speed::from_f32(speed_rad_s));
+        let duty = Loops::default().duty(config, torque, speed, Voltage::from_f32(bus_v), &mut limits);
+        (duty, limits)
+    }
+
+    #[test]
+    fn duty_by_hand() {
+        // k_t N = 0.9 N·m/A, R = 2 Ω: 0.9 N·m are 1 A are 2 V; 10 rad/s are 9 V more. Of 24 V that is 11/24.
+        let mut config = config().drive;
+        for (torque, speed, bus, expected) in
+            [(0.9, 0.0, 24.0, 2.0 / 24.0), (0.9, 10.0, 24.0, 11.0 / 24.0), (-0.9, 10.0, 20.0, 7.0 / 20.0)]
+        {
+            let (duty, limits) = duty(&config, torque, speed, bus);
+            // 1 mV of both voltages.
+            assert!((f32::from(duty) - expected * 32767.0).abs() < 3.0, "{duty} for {expected}");
+            assert_eq!(limits, Limits::default());
+        }
+        let (forward, _) = duty(&config, 0.9, 1.0, 24.0);
+        config.reversed = true;
+        assert_eq!(duty(&config, 0.9, 1.0, 24.0).0, -forward);
+    }
+
+    #[test]
+    fn current_and_duty_are_limited_and_told() {
+        let config = config().drive;
+        // 9 N·m would be 10 A; 3 A are 6 V, whatever the speed adds.
+        let (value, limits) = duty(&config, -9.0, 0.0, 24.0);
+        assert!((f32::from(value) + 6.0 / 24.0 * 32767.0).abs() < 3.0, "{value}");
+        assert!(limits.contains(Limit::Current) && !limits.contains(Limit::Duty));
+        // 26 rad/s are 23.4 V; 0.95 of 24 V are left.
+        let (value, limits) = duty(&config, 0.9, 26.0, 24.0);
+        assert_eq!(value, 31_129);
+        assert!(limits.contains(Limit::Duty) && !limits.contains(Limit::Current));
+        // A bus that is not there divides by no zero.
+        for bus_v in [0.0, -5.0, 2000.0] {
+            let (value, _) = duty(&config, 2000.0, 2000.0, bus_v);
+            assert!((0..=31_129).contains(&value), "{value} at {bus_v} V");
+        }
+    }
+
+    #[test]
+    fn the_integral_rests_at_a_limit_and_within_a_count() {
+        let config = config();
+        let run = |command_rad: f32, measured_rad: f32| {
+            let mut loops = Loops::default();
+            let mut limits = Limits::default();
+            let motion = Motion { angle: Angle::from_f32(measured_rad), speed: Speed::ZERO };
+            let input = PositionInput {
+                command: Angle::from_f32(command_rad),
+                command_speed: Speed::ZERO,
+                acceleration: Acceleration::ZERO,
+                measured: motion.angle,
+                motion,
+                torque_in: Torque::ZERO,
+            };
+            for _ in 0..1000 {
+                limits = Limits::default();
+                let torque = loops.position(&config.position, &config.drive, &input, &mut limits);
+                loops.duty(&config.drive, torque, Speed::ZERO, Voltage::from_f32(24.0), &mut limits);
+            }
+            (loops.acceleration.value().to_f32(), limits.contains(Limit::Integrator))
+        };
+        // 0.05 rad: 2527·0.05 = 126 rad/s², and after 0.1 s, the reset time, as much again.
+        let (integral, rests) = run(0.05, 0.0);
+        assert!((integral - 126.3).abs() < 1.0 && !rests, "{integral}");
+        // 1 rad asks for 12.6 A of the 3 A that there are: not a tick more than the first.
+        let (integral, rests) = run(-1.0, 0.0);
+        assert!(integral.abs() < 3.0 && rests, "{integral}");
+        // 0.7 mrad is within half a count.
+        assert_eq!(run(0.000_7, 0.0), (0.0, false));
+    }
+}

@@ -1,0 +1,316 @@
+//! The slow side of the board: answers requests, keeps the parameters, watches the host.
+//!
+//! Nothing here runs in the control tick. The tick is reached through [`Port`], whose queues never make it wait.
+
+pub mod batcher;
+pub mod store;
+
+use bowden_link::message::{Boot, Goal, Greeting, Parameter, Provocation, Refusal, Status};
+use bowden_link::{
+    Fault, FaultRecord, FromBoard, Limits, PROTOCOL_VERSION, Request, SCHEMA, Sample, State, ToBoard,
+};
+use heapless::String;
+
+use crate::parameters::Parameters;
+use crate::reference::reference_config;
+use crate::supervisor::allows;
+use crate::tick::Command;
+use crate::tick_config;
+
+pub use batcher::Batcher;
+pub use store::{ParameterStore, StoreError};
+
+/// What the tick tells of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct View {
+    /// State of the supervisor.
+    pub state: State,
+    /// Fault that waits to be cleared.
+    pub fault: Option<FaultRecord>,
+    /// Limits that act.
+    pub limits: Limits,
+    /// Control ticks since boot.
+    pub tick: u32,
+    /// Longest tick since boot, processor cycles; 0 where there is no such counter.
+    pub longest_tick_cycles: u32,
+    /// Samples lost since boot because the link was too slow.
+    pub lost: u32,
+    /// Samples in the snapshot.
+    pub snapshot: u8,
+}
+
+/// Way to the control tick.
+///
+/// # Contract
+/// No call waits. What does not fit into a queue is given back.
+pub trait Port {
+    /// Queues a command for the next tick; `false` if there is no room.
+    #[must_use]
+    fn command(&mut self, command: Command) -> bool;
+    /// Reference points, in 2⁻²⁰ of their unit, that the stream takes still.
+    fn stream_free(&self) -> usize;
+    /// Appends a reference point; `false` if there is no room.
+    #[must_use]
+    fn stream(&mut self, point_raw: i32) -> bool;
+    /// What the tick tells of itself.
+    fn view(&self) -> View;
+    /// Sample of the snapshot, 0 the oldest, with its tick.
+    fn snapshot(&self, index: u8) -> Option<(u32, Sample)>;
+    /// The tick takes these parameters; what of them concerns the hardware acts from now on: rate, encoder parts.
+    fn adopt(&mut self, parameters: &Parameters);
+}
+
+/// Who the board is.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    /// Version of the firmware.
+    pub firmware: &'static str,
+    /// Name of the board.
+    pub board: &'static str,
+    /// What started this run.
+    pub boot: Boot,
+}
+
+/// What to do with a request.
+// One lives at a time, on the stack of the task that sends it.
+#[expect(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reply {
+    /// Send this.
+    Say(FromBoard),
+    /// Write [`Service::parameters`] to flash, then send [`Service::stored`].
+    Store,
+    /// Send [`FromBoard::Done`], then suffer this.
+    Suffer(Provocation),
+}
+
+/// Longest panic text that is kept, bytes.
+pub const PANIC_TEXT: usize = 128;
+
+/// Answers requests and keeps what they change.
+#[derive(Debug)]
+pub struct Service {
+    identity: Identity,
+    parameters: Parameters,
+    panic_text: String<PANIC_TEXT>,
+    telemetry: bool,
+    heard_ms: u32,
+    bad_frames: u32,
+    /// Number of the request whose reference points were taken last.
+    streamed: Option<u16>,
+}
+
+impl Service {
+    /// A service that has heard nothing yet. `panic_text` is cut to [`PANIC_TEXT`] bytes.
+    pub fn new(identity: Identity, parameters: Parameters, panic_text: &str) -> Self {
+        let mut kept = String::new();
+        for character in panic_text.chars() {
+            if kept.push(character).is_err() {
+                break;
+            }
+        }
+        Self {
+            identity,
+            parameters,
+            panic_text: kept,
+            telemetry: false,
+            heard_ms: 0,
+            bad_frames: 0,
+            streamed: None,
+        }
+    }
+
+    /// The parameters that act.
+    pub const fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Whether the host wants telemetry.
+    pub const fn telemetry(&self) -> bool {
+        self.telemetry
+    }
+
+    /// A frame of the host could not be read.
+    pub const fn bad_frame(&mut self) {
+        self.bad_frames = self.bad_frames.saturating_add(1);
+    }
+
+    /// The link is gone; nobody listens to telemetry.
+    pub const fn disconnected(&mut self) {
+        self.telemetry = false;
+    }
+
+    /// Answer to [`Reply::Store`].
+    pub const fn stored(ok: bool) -> FromBoard {
+        if ok { FromBoard::Done } else { FromBoard::Refused(Refusal::Storage) }
+    }
+
+    /// Carries a request out as far as it needs no flash. `now_ms` wraps.
+    pub fn handle(&mut self, request: &Request, now_ms: u32, port: &mut impl Port) -> Reply {
+        self.heard_ms = now_ms;
+        let answer = match &request.message {
+            ToBoard::StoreParameters => {
+                // Erasing masks all interrupts below the tick's, so encoders are not read meanwhile.
+                let state = port.view().state;
+                if matches!(state, State::Off | State::Fault) {
+                    return Reply::Store;
+                }
+                Err(Refusal::WrongState(state))
+            }
+            ToBoard::Hello => {
+                // Another program counts its requests anew.
+                self.streamed = None;
+                Ok(self.greeting())
+            }
+            ToBoard::Alive => Ok(FromBoard::Done),
+            ToBoard::ReadParameter(index) => self.parameter(*index),
+            ToBoard::WriteParameter { index, value } => self.write(*index, *value, port),
+            ToBoard::DefaultParameters => self.adopt(Parameters::default(), port),
+            ToBoard::Enter(goal) => Self::enter(*goal, port),
+            ToBoard::SetReference(reference) => reference_config(&self.parameters, *reference)
+                .and_then(|config| send(port, Command::SetReference(config))),
+            ToBoard::StreamPoints(points) => self.stream(request.sequence, points, port),
+            ToBoard::Telemetry(on) => {
+                self.telemetry = *on;
+                Ok(FromBoard::Done)
+            }
+            ToBoard::ReadStatus => Ok(FromBoard::Status(self.status(port))),
+            ToBoard::ReadSnapshot(index) => port
+                .snapshot(*index)
+                .map(|(tick, sample)| FromBoard::SnapshotSample { tick, sample })
+                .ok_or(Refusal::NoSuchIndex),
+            ToBoard::ReadPanicText => Ok(FromBoard::PanicText(self.panic_text.clone())),
+            ToBoard::Provoke(provocation) => {
+                if self.parameters.allows_provocation() {
+                    return Reply::Suffer(*provocation);
+                }
+                Err(Refusal::Forbidden(Parameters::index_of("supervisor.allow_provoke").unwrap_or(u16::MAX)))
+            }
+        };
+        Reply::Say(answer.unwrap_or_else(FromBoard::Refused))
+    }
+
+    /// To be called every few milliseconds: a moving joint whose host fell silent is stopped.
+    pub fn supervise(&mut self, now_ms: u32, port: &mut impl Port) {
+        let silent_s = now_ms.wrapping_sub(self.heard_ms) as f32 * 1e-3;
+        let limit_s = self.parameters.host_timeout_s();
+        if port.view().state.drives() && silent_s > limit_s {
+            // A full queue is tried again a few milliseconds later.
+            let _ = port.command(Command::Trip(Fault::HostSilent, 0, silent_s, limit_s));
+        }
+    }
+
+    fn greeting(&self) -> FromBoard {
+        FromBoard::Greeting(Greeting {
+            protocol_version: PROTOCOL_VERSION,
+            schema: SCHEMA,
+            firmware: cut(self.identity.firmware),
+            board: cut(self.identity.board),
+            parameters: Parameters::COUNT,
+            boot: self.identity.boot,
+        })
+    }
+
+    fn parameter(&self, index: u16) -> Result<FromBoard, Refusal> {
+        let (Some(specification), Some(value)) =
+            (Parameters::specification(index), self.parameters.get(index))
+        else {
+            return Err(Refusal::NoSuchIndex);
+        };
+        Ok(FromBoard::Parameter(Parameter {
+            index,
+            name: cut(specification.name),
+            unit: cut(specification.unit),
+            value,
+            minimum: specification.minimum,
+            maximum: specification.maximum,
+            default: specification.default,
+        }))
+    }
+
+    fn write(&mut self, index: u16, value: f32, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        let specification = Parameters::specification(index).ok_or(Refusal::NoSuchIndex)?;
+        if !specification.changes_while_moving && port.view().state.drives() {
+            return Err(Refusal::Moving);
+        }
+        let mut changed = self.parameters.clone();
+        changed.set(index, value)?;
+        self.act_on(changed, port)
+    }
+
+    fn adopt(&mut self, parameters: Parameters, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        if port.view().state.drives() {
+            return Err(Refusal::Moving);
+        }
+        self.act_on(parameters, port)
+    }
+
+    /// All or nothing: the parameters change only when the tick takes them.
+    fn act_on(&mut self, parameters: Parameters, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        let config = tick_config(&parameters)?;
+        let done = send(port, Command::Configure(config))?;
+        port.adopt(&parameters);
+        self.parameters = parameters;
+        Ok(done)
+    }
+
+    fn enter(goal: Goal, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        let state = port.view().state;
+        if !allows(state, goal) {
+            return Err(Refusal::WrongState(state));
+        }
+        send(port, Command::Enter(goal))
+    }
+
+    /// All points or none. A request that comes again under its number, because its answer was lost, appends nothing
+    /// twice.
+    fn stream(&mut self, number: u16, points: &[f32], port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        const RANGE: f32 = 2_000.0;
+        if let Some(bad) = points.iter().find(|point| point.is_nan() || point.abs() > RANGE) {
+            return Err(Refusal::OutOfRange { got: *bad, minimum: -RANGE, maximum: RANGE });
+        }
+        if self.streamed != Some(number) {
+            if port.stream_free() < points.len() {
+                return Err(Refusal::StreamFull);
+            }
+            for point in points {
+                if !port.stream((point * (1 << 20) as f32) as i32) {
+                    return Err(Refusal::StreamFull);
+                }
+            }
+            self.streamed = Some(number);
+        }
+        Ok(FromBoard::StreamFree(u16::try_from(port.stream_free()).unwrap_or(u16::MAX)))
+    }
+
+    fn status(&self, port: &impl Port) -> Status {
+        let View { state, fault, limits, tick, longest_tick_cycles, lost, snapshot } = port.view();
+        Status {
+            state,
+            fault,
+            limits,
+            tick,
+            period_ns: self.parameters.period_ns(),
+            longest_tick_cycles,
+            lost,
+            bad_frames: self.bad_frames,
+            snapshot,
+        }
+    }
+}
+
+#[expect(clippy::large_types_passed_by_value, reason = "moved into the queue")]
+fn send(port: &mut impl Port, command: Command) -> Result<FromBoard, Refusal> {
+    if port.command(command) { Ok(FromBoard::Done) } else { Err(Refusal::Busy) }
+}
+
+/// `text`, cut at a character boundary to what fits.
+fn cut<const N: usize>(text: &str) -> String<N> {
+    let mut kept = String::new();
+    for character in text.chars() {
+        if kept.push(character).is_err() {
+            break;
+        }
+    }
+    kept
+}

@@ -1,0 +1,83 @@
+//! What goes into a control tick and what comes out.
+
+use bowden_link::message::Goal;
+use bowden_link::{Fault, FaultRecord, Sample};
+
+pub use crate::parameters::{ReferenceConfig, TickConfig};
+
+/// An encoder as the board read it last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EncoderWord {
+    /// Frame as received, right-aligned.
+    pub frame_raw: u32,
+    /// Counts the transfers and wraps; unchanged means that no frame came since the last tick.
+    pub sequence: u8,
+    /// The bus reports that the transfer failed.
+    pub bus_error: bool,
+}
+
+/// Everything that the hardware measured for one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TickInput {
+    /// Input pulley and joint.
+    pub encoder: [EncoderWord; 2],
+    /// ADC codes of f1 to f4.
+    pub tension_raw: [u16; 4],
+    /// ADC code of the motor current.
+    pub current_raw: u16,
+    /// ADC code of the bus voltage.
+    pub bus_raw: u16,
+    /// The bridge reports a fault or its output was switched off by hardware.
+    pub bridge_fault: bool,
+}
+
+/// What the hardware has to do after a tick, and what is told about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TickOutput {
+    /// Duty of the bridge, 1/32767; 0 while the bridge is off.
+    pub duty_raw: i16,
+    /// Whether the bridge is on.
+    pub bridge_on: bool,
+    /// All signals of this tick.
+    pub sample: Sample,
+    /// The fault, in the tick of its detection only; the bridge is off in that tick already.
+    pub tripped: Option<FaultRecord>,
+}
+
+/// An order to the control tick.
+// The queue holds few of them, and a configuration is moved into the controller at once: a box would need memory.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Use this configuration from now on.
+    Configure(TickConfig),
+    /// Change the state; ignored where [`crate::supervisor::allows`] says no.
+    Enter(Goal),
+    /// Follow this reference, from the present one on, smoothly.
+    SetReference(ReferenceConfig),
+    /// Stop: something outside the tick went wrong. Fault, channel as in [`FaultRecord::channel`], what was measured,
+    /// what is allowed. Acts in every state; the first fault is kept.
+    Trip(Fault, u8, f32, f32),
+}
+
+/// Queues into the tick: free of locks on the board, plain queues elsewhere.
+pub trait Inbox {
+    /// Next command; at most one is taken a tick.
+    fn command(&mut self) -> Option<Command>;
+    /// Next point of a streamed reference, 2⁻²⁰ rad or 2⁻²⁰ N·m.
+    fn stream_point(&mut self) -> Option<i32>;
+}
+
+/// No orders.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoInbox;
+
+impl Inbox for NoInbox {
+    fn command(&mut self) -> Option<Command> {
+        None
+    }
+
+    fn stream_point(&mut self) -> Option<i32> {
+        None
+    }
+}

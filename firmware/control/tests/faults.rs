@@ -1,0 +1,310 @@
+//! Every fault, provoked at the pins: the bridge is off in the tick of the detection, not before its debounce and not after.
+
+mod bench;
+
+use bench::{Bench, Disturbance, amt22, joint};
+use bowden_control::parameters::Parameters;
+use bowden_control::tick::Command;
+use bowden_link::message::{Goal, Mode, Reference, Shape};
+use bowden_link::{Fault, FaultRecord, Limit, State};
+
+/// A joint that follows a sine; its speed is largest and its angle zero at whole and half periods of 4 s.
+fn running(parameters: Parameters) -> Bench {
+    let mut bench = Bench::ready(parameters, joint());
+    bench.refer(Reference::Generated { shape: Shape::Sine, amplitude: 0.4, offset: 0.0, frequency_hz: 0.25 });
+    bench.order(Goal::Run(Mode::Position));
+    bench.run(4.3);
+    assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
+    bench
+}
+
+/// Ticks until the fault came, and its record. The motor is off in that very tick and stays off.
+fn trip(bench: &mut Bench, ticks: usize) -> (usize, FaultRecord) {
+    for n in 1..=ticks {
+        let tick = bench.controller.tick_count();
+        let output = bench.tick();
+        let Some(record) = output.tripped else { continue };
+        assert!(!output.bridge_on && output.duty_raw == 0, "{record}");
+        assert_eq!((output.sample.state, output.sample.duty_raw), (State::Fault, 0));
+        assert_eq!(record.tick, tick);
+        assert_eq!(bench.controller.fault(), Some(record));
+        for _ in 0..100 {
+            let later = bench.tick();
+            assert!(!later.bridge_on && later.duty_raw == 0 && later.tripped.is_none());
+        }
+        return (n, record);
+    }
+    panic!("no fault in {ticks} ticks; state {:?}", bench.controller.state());
+}
+
+struct Case {
+    disturbance: Disturbance,
+    fault: Fault,
+    channel: u8,
+    /// Ticks of 0.1 ms from the first wrong input to the stop.
+    ticks: usize,
+    got: f32,
+    limit: f32,
+    /// Whether it counts in the self test and in ready.
+    at_rest: [bool; 2],
+}
+
+/// Numbers by hand from the front end: tension code 620.5 + F/0.035037, 3.3 V over 4095 codes, current code
+/// 2047.5 + i/0.0067155, bus 0.0088645 V a code; debounce 1 ms, 0.2 ms and 5 ms are 10, 2 and 50 ticks.
+fn cases() -> Vec<Case> {
+    let case = |disturbance, fault, channel, ticks, got, limit, at_rest| Case {
+        disturbance,
+        fault,
+        channel,
+        ticks,
+        got,
+        limit,
+        at_rest,
+    };
+    let both = [true; 2];
+    vec![
+        case(|input| input.encoder[0].frame_raw ^= 0x8000, Fault::EncoderCheck, 0, 4, 4.0, 4.0, both),
+        case(|input| input.encoder[1].frame_raw = 0xffff, Fault::EncoderCheck, 1, 4, 4.0, 4.0, both),
+        // One bit of the position and the check bit over it, so that the frame is one of the 14-bit type.
+        case(|input| input.encoder[1].frame_raw ^= 0x8002, Fault::EncoderStatus, 1, 4, 4.0, 4.0, both),
+        case(|input| input.encoder[0].bus_error = true, Fault::EncoderMissing, 0, 4, 4.0, 4.0, both),
+        // The first frozen number is a new one.
+        case(|input| input.encoder[1].sequence = 255, Fault::EncoderMissing, 1, 5, 4.0, 4.0, both),
+        case(|input| input.tension_raw[2] = 123, Fault::TensionRail, 2, 10, 0.0991, 0.1, both),
+        case(|input| input.tension_raw[3] = 4095, Fault::TensionRail, 3, 10, 3.3, 3.2, both),
+        case(|input| input.tension_raw[1] = 635, Fault::Slack, 1, 10, 0.508, 1.0, [false, true]),
+        case(|input| input.tension_raw[0] = 3300, Fault::OverTension, 0, 10, 93.88, 90.0, [false, true]),
+        case(|input| input.current_raw = 3389, Fault::OverCurrent, 0, 2, 9.009, 8.0, both),
+        case(|input| input.current_raw = 706, Fault::OverCurrent, 0, 2, -9.009, 8.0, both),
+        case(|input| input.bus_raw = 1900, Fault::BusUnderVoltage, 0, 50, 16.84, 18.0, both),
+        case(|input| input.bus_raw = 3500, Fault::BusOverVoltage, 0, 50, 31.03, 30.0, both),
+        case(|input| input.bridge_fault = true, Fault::BridgeFault, 0, 1, 1.0, 0.0, both),
+    ]
+}
+
+#[test]
+fn every_fault_stops_the_motor_in_its_tick() {
+    for case in cases() {
+        let mut bench = running(Parameters::default());
+        bench.disturbance = Some(case.disturbance);
+        let (ticks, record) = trip(&mut bench, 200);
+        assert_eq!((record.fault, record.channel, ticks), (case.fault, case.channel, case.ticks), "{record}");
+        assert!((record.got - case.got).abs() <= 2e-3 * case.got.abs(), "{record}: expected {}", case.got);
+        assert!((record.limit - case.limit).abs() <= 5e-3 * case.limit.abs(), "{record}");
+    }
+}
+
+#[test]
+fn faults_count_in_the_states_of_the_table() {
+    for case in cases() {
+        let mut off = Bench::new(Parameters::default(), joint());
+        off.run(0.01);
+        off.disturbance = Some(case.disturbance);
+        off.run(0.05);
+        assert_eq!(off.controller.state(), State::Off, "{:?} counts in off", case.fault);
+
+        let [in_self_test, in_ready] = case.at_rest;
+        let mut testing = Bench::new(Parameters::default(), joint());
+        testing.run(0.01);
+        testing.order(Goal::Ready);
+        testing.run(0.02);
+        assert_eq!(testing.controller.state(), State::SelfTest);
+        testing.disturbance = Some(case.disturbance);
+        testing.run(0.01);
+        let fault = testing.controller.fault().map(|record| record.fault);
+        assert_eq!(fault, in_self_test.then_some(case.fault));
+
+        let mut ready = Bench::ready(Parameters::default(), joint());
+        ready.disturbance = Some(case.disturbance);
+        ready.run(0.01);
+        let fault = ready.controller.fault().map(|record| record.fault);
+        assert_eq!(fault, in_ready.then_some(case.fault));
+    }
+}
+
+#[test]
+fn bits_of_an_as5045_are_all_used() {
+    let mut parameters = Parameters::default();
+    parameters.encoder.input.part = 1.0;
+    parameters.encoder.joint.part = 1.0;
+    let cases: [(Disturbance, Fault); 4] = [
+        (|input| input.encoder[0].frame_raw ^= 1, Fault::EncoderParity),
+        // OCF lost, COF and LIN set; the parity follows.
+        (|input| input.encoder[0].frame_raw ^= 0x21, Fault::EncoderStatus),
+        (|input| input.encoder[0].frame_raw ^= 0x11, Fault::EncoderStatus),
+        (|input| input.encoder[0].frame_raw ^= 0x09, Fault::EncoderStatus),
+    ];
+    for (disturbance, fault) in cases {
+        let mut bench = running(parameters.clone());
+        bench.disturbance = Some(disturbance);
+        let (ticks, record) = trip(&mut bench, 10);
+        assert_eq!((record.fault, record.channel, ticks), (fault, 0, 4));
+    }
+    // Both magnet bits: marginal, told and not a fault.
+    let mut bench = running(parameters);
+    bench.disturbance = Some(|input| input.encoder[1].frame_raw ^= 0x06);
+    bench.run(0.1);
+    assert_eq!(bench.controller.state(), State::Run);
+    assert!(bench.controller.limits().contains(Limit::MagnetMarginal));
+}
+
+#[test]
+fn single_bad_frames_are_repaired() {
+    let mut bench = running(Parameters::default());
+    let mut repaired = 0;
+    for n in 0..20_000 {
+        // Three bad frames in a row, one less than a fault.
+        bench.disturbance = (n % 10 < 3).then_some(|input| input.encoder[0].frame_raw ^= 0x0010);
+        let output = bench.tick();
+        repaired += usize::from(output.sample.limits.contains(Limit::FrameRepaired));
+        let wanted = f64::from(output.sample.reference_raw) / f64::from(1 << 20);
+        let error = bench.plant.theta_out_rad() - wanted;
+        assert!(error.abs() < 6e-3, "error {error} rad");
+    }
+    assert_eq!((bench.controller.state(), repaired), (State::Run, 6000));
+}
+
+#[test]
+fn a_jump_is_told_in_its_speed() {
+    // A loose magnet: 300 counts off from now on. 300 counts in a tick of 0.1 ms are 4602 rad/s. The limit is 60 rad/s,
+    // 3.91 counts a tick, rounded up to 4, and 2 for grid and noise: 92 rad/s.
+    let mut bench = running(Parameters::default());
+    bench.disturbance = Some(|input| {
+        let count = (input.encoder[0].frame_raw >> 2 & 0xfff) + 300;
+        input.encoder[0].frame_raw = amt22(count);
+    });
+    let (ticks, record) = trip(&mut bench, 10);
+    assert_eq!((record.fault, record.channel, ticks), (Fault::EncoderJump, 0, 4));
+    assert!((record.got - 4602.0).abs() < 20.0 && (record.limit - 92.04).abs() < 0.1, "{record}");
+}
+
+/// A joint that is told to move on from angle zero.
+fn setting_out() -> Bench {
+    let mut bench = Bench::ready(Parameters::default(), joint());
+    bench.refer(Reference::Hold(0.6));
+    bench.order(Goal::Run(Mode::Position));
+    bench
+}
+
+#[test]
+fn an_encoder_that_stands_is_found() {
+    // The joint's encoder: the input pulley moves away from it by 0.15 rad within the ramp of 0.5 s.
+    let mut bench = setting_out();
+    bench.disturbance = Some(|input| input.encoder[1].frame_raw = amt22(2000));
+    let (ticks, record) = trip(&mut bench, 10_000);
+    assert_eq!((record.fault, record.channel), (Fault::EncoderStuck, 1));
+    assert!(ticks < 5000 && record.got > 0.15 && record.got < 0.3, "{record} after {ticks} ticks");
+    // The input's encoder, on which the loop closes: the motor runs away, and is stopped before the joint is at 0.4 rad.
+    let mut bench = setting_out();
+    bench.disturbance = Some(|input| input.encoder[0].frame_raw = amt22(1000));
+    let (_, record) = trip(&mut bench, 10_000);
+    assert_eq!((record.fault, record.channel), (Fault::EncoderStuck, 0));
+    assert!(bench.plant.theta_out_rad().abs() < 0.4, "{} rad", bench.plant.theta_out_rad());
+}
+
+#[test]
+fn tensions_that_do_not_fit_the_friction_are_found() {
+    // f1 reads 75 N. f2 is 30 N or less there, and e^(0.377 + 0.15)·30 + 4 = 54.8 N is allowed.
+    let mut bench = Bench::ready(Parameters::default(), joint());
+    bench.disturbance = Some(|input| input.tension_raw[0] = 2761);
+    let (ticks, record) = trip(&mut bench, 2000);
+    assert_eq!((record.fault, record.channel), (Fault::TensionInconsistent, 0));
+    // 50 ms, and what the low-pass of 5 ms needs from 30 N to 55 N: 5 ms ln(45/20) = 4 ms.
+    assert!((500..=560).contains(&ticks), "{ticks} ticks");
+    assert!(record.got > record.limit && (50.0..58.0).contains(&record.limit), "{record}");
+}
+
+#[test]
+fn faults_from_outside_count_everywhere_and_the_first_one_stays() {
+    let mut bench = Bench::new(Parameters::default(), joint());
+    bench.queues.commands.push_back(Command::Trip(Fault::Watchdog, 0, 0.0, 0.0));
+    let (ticks, record) = trip(&mut bench, 1);
+    assert_eq!((record.fault, ticks), (Fault::Watchdog, 1));
+    bench.queues.commands.push_back(Command::Trip(Fault::Panic, 0, 0.0, 0.0));
+    bench.order(Goal::Ready);
+    bench.run(0.01);
+    assert_eq!(bench.controller.fault().map(|record| record.fault), Some(Fault::Watchdog));
+    bench.order(Goal::ClearFault);
+    bench.run(0.01);
+    assert_eq!((bench.controller.state(), bench.controller.fault()), (State::Off, None));
+
+    let mut bench = running(Parameters::default());
+    bench.queues.commands.push_back(Command::Trip(Fault::HostSilent, 0, 0.7, 0.5));
+    let (ticks, record) = trip(&mut bench, 1);
+    assert_eq!((record.fault, record.got, record.limit, ticks), (Fault::HostSilent, 0.7, 0.5, 1));
+}
+
+#[test]
+fn the_self_test_wants_sensors_alive_and_at_rest() {
+    let cases: [(Disturbance, u8); 3] = [
+        // A dead channel: always the same code.
+        (|input| input.tension_raw[2] = 1480, 2),
+        // 0.8 A with the bridge off.
+        (|input| input.current_raw = 2167, 6),
+        // A joint that somebody turns: three counts to and fro.
+        (
+            |input| {
+                if input.encoder[1].sequence & 64 == 0 {
+                    input.encoder[1].frame_raw = amt22(2003);
+                }
+            },
+            5,
+        ),
+    ];
+    for (disturbance, channel) in cases {
+        let mut bench = Bench::new(Parameters::default(), joint());
+        bench.disturbance = Some(disturbance);
+        bench.run(0.01);
+        bench.order(Goal::Ready);
+        let (ticks, record) = trip(&mut bench, 30_000);
+        assert_eq!((record.fault, record.channel), (Fault::SelfTestTimeout, channel));
+        // At the end of the first look of 0.1 s that ends at or beyond 2 s.
+        assert!((20_000..21_002).contains(&ticks), "{ticks} ticks");
+        assert_eq!(record.limit, 2.0);
+    }
+    // It passes when they come to rest in time.
+    let mut bench = Bench::new(Parameters::default(), joint());
+    bench.disturbance = Some(|input| input.current_raw = 2167);
+    bench.order(Goal::Ready);
+    bench.run(0.95);
+    assert_eq!(bench.controller.state(), State::SelfTest);
+    bench.disturbance = None;
+    assert!(bench.reaches(State::Ready, 0.4));
+}
+
+#[test]
+fn a_lost_pretension_is_found_before_the_bridge_is_on() {
+    let mut slack = joint();
+    if let Some(tendon) = &mut slack.tendon {
+        tendon.pretension_n = 20.0;
+    }
+    let mut bench = Bench::new(Parameters::default(), slack);
+    // f3 reads 57 codes, 2 N, less than the others.
+    bench.disturbance = Some(|input| input.tension_raw[2] -= 57);
+    bench.order(Goal::Ready);
+    let (_, record) = trip(&mut bench, 10_000);
+    assert_eq!((record.fault, record.channel), (Fault::PretensionOff, 2));
+    // Mean of the four ends at rest, nothing slipped yet: F0 itself, less a quarter of 2 N.
+    assert!((record.got - 19.5).abs() < 0.1 && (record.limit - 24.0).abs() < 1e-3, "{record}");
+}
+
+#[test]
+fn homing_that_does_not_arrive_ends() {
+    let mut parameters = Parameters::default();
+    parameters.supervisor.homing_timeout = 0.2;
+    let mut bench = Bench::ready(parameters, joint());
+    bench.refer(Reference::Hold(0.5));
+    bench.order(Goal::Run(Mode::Position));
+    bench.run(2.0);
+    bench.order(Goal::Off);
+    bench.run(0.5);
+    // Friction holds the arm up to sin θ = 0.339/0.735.
+    assert!(bench.plant.theta_out_rad() > 0.3);
+    bench.order(Goal::Ready);
+    assert!(bench.reaches(State::Ready, 1.0));
+    bench.order(Goal::Home);
+    let (ticks, record) = trip(&mut bench, 3000);
+    assert!(record.fault == Fault::HomingTimeout && (record.limit - 0.2).abs() < 1e-6, "{record}");
+    // One tick for the order.
+    assert!((2000..=2001).contains(&ticks), "{ticks} ticks");
+}
