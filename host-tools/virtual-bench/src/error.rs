@@ -47,6 +47,12 @@ pub enum BenchError {
         /// Strength asked for.
         got: f64,
     },
+    /// An effect cannot act on a bench that is stepped from outside.
+    #[error("effect '{id}' needs a fixed sample rate, which a live bench has not: leave it out")]
+    NotLive {
+        /// Id of the effect.
+        id: &'static str,
+    },
     /// No motion has this name.
     #[error("no motion is called '{got}', expected one of {expected}")]
     UnknownMotion {

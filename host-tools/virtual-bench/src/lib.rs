@@ -39,6 +39,8 @@
 //! The lab's position controller (PI-D) closes its loop on the drive's own rotor encoder, which is not recorded. With
 //! that recording's reference its duty agrees to 0.0011 rms of 0.052.
 //!
+//! [`LiveBench`] is the same bench stepped from outside, for a driver board in place of the lab's controller.
+//!
 //! # Effects
 //! [`ConcealedEffect`] hides physics that the user's rig file does not mention. A slot that is empty costs a flag; the
 //! tendon loop is compiled twice, with and without the look at node effects. A steep Stribeck curve makes the rope
@@ -69,6 +71,7 @@ mod controller;
 mod draw;
 mod effects;
 mod error;
+mod live;
 mod motion;
 mod plant;
 mod record;
@@ -81,6 +84,7 @@ pub use case::{Case, Parameter};
 pub use config::{BenchConfig, Bend, ControllerGains, nominal_rig_toml};
 pub use effects::*;
 pub use error::BenchError;
+pub use live::{Bridge, LiveBench};
 pub use motion::{Motion, MotionKind};
 pub use record::{Drive, record, record_driven};
 pub use recording::Recording;

@@ -100,6 +100,8 @@ pub(crate) struct Plant {
     clock_s: f64,
     steps: u64,
     clock_start_s: f64,
+    /// Pretension of cable a and b over that of the configuration \[1\]; 1 unless a live bench is tampered with.
+    pretension_ratio: [f64; 2],
 }
 
 impl Plant {
@@ -152,6 +154,7 @@ impl Plant {
             clock_s: clock_start_s,
             steps: 0,
             clock_start_s,
+            pretension_ratio: [1.0; 2],
         };
         plant.update_tensions();
         plant
@@ -183,15 +186,37 @@ impl Plant {
         [a.input_n(), a.output_n(), b.input_n(), b.output_n()]
     }
 
+    /// Sets the supply of the bridge \[V\].
+    pub(crate) fn set_supply_v(&mut self, supply_v: f64) {
+        self.config.supply_v = supply_v;
+    }
+
+    /// Sets the pretension of cable a and b over that of the configuration \[1\].
+    pub(crate) fn set_pretension_ratio(&mut self, ratio: [f64; 2]) {
+        self.pretension_ratio = ratio;
+    }
+
     /// One step under a constant duty.
     pub(crate) fn step(&mut self, duty: f64) {
+        self.step_bridge(Some(duty));
+    }
+
+    /// One step with all switches of the bridge open.
+    pub(crate) fn step_open(&mut self) {
+        self.step_bridge(None);
+    }
+
+    fn step_bridge(&mut self, duty: Option<f64>) {
         let dt = self.config.step_s;
         self.update_bends();
         self.update_tensions();
         let input_nm = (self.tendons[0].input_n() - self.tendons[1].input_n()) * self.config.input_radius_m;
         let output_nm =
             (self.tendons[0].output_n() - self.tendons[1].output_n()) * self.config.output_radius_m;
-        self.advance_motor(duty, dt);
+        match duty {
+            Some(duty) => self.advance_motor(duty, dt),
+            None => self.advance_motor_open(dt),
+        }
         let drum_nm = self.drum_hub.torque_nm(self.input, self.drum);
         let gear_nm = self.advance_rotor_and_shaft(drum_nm, dt);
         if let Some(law) = &self.effects.gear_load_friction {
@@ -235,6 +260,20 @@ impl Plant {
         let back_emf = self.torque_constant_at_pulley() * self.rotor.omega_rad_per_s;
         let voltage = duty * self.config.supply_v - resistance * self.current_a - back_emf;
         self.current_a += dt / self.config.inductance_h * voltage;
+    }
+
+    /// Bridge open: the current flows on through the diodes, against the supply, and stops at zero.
+    ///
+    /// The back-emf of this motor stays below the supply, so no diode conducts again.
+    fn advance_motor_open(&mut self, dt: f64) {
+        if self.current_a == 0.0 {
+            return;
+        }
+        let back_emf = self.torque_constant_at_pulley() * self.rotor.omega_rad_per_s;
+        let sign = self.current_a.signum();
+        let voltage = -sign * self.config.supply_v - self.config.resistance_ohm * self.current_a - back_emf;
+        let next = self.current_a + dt / self.config.inductance_h * voltage;
+        self.current_a = if next * sign > 0.0 { next } else { 0.0 };
     }
 
     /// Rotor and input shaft; returns the torque that the gear carries.
@@ -316,7 +355,7 @@ impl Plant {
                 end(self.output, self.config.output_radius_m),
             );
             let material = Material {
-                pretension_n: loss * self.config.pretension_n,
+                pretension_n: self.pretension_ratio[index] * (loss * self.config.pretension_n),
                 creep_m: self.state.creep_strain[index] * tendon.element_m(),
                 stiffening: self.effects.tendon_stiffening.as_ref(),
                 slack: self.effects.tendon_slack.as_ref(),

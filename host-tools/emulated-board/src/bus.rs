@@ -1,0 +1,460 @@
+//! Peripherals together: events in the order of time, interrupt lines, DMA requests, and what the pins are wired to.
+
+mod address_map;
+
+use virtual_bench::Bridge;
+
+use crate::analog;
+use crate::clock::Clock;
+use crate::error::BoardError;
+use crate::peripherals::NEVER;
+use crate::peripherals::adc::{Adc, Common, Need};
+use crate::peripherals::advanced_timer::{AdvancedTimer, Leg};
+use crate::peripherals::crs::Crs;
+use crate::peripherals::dbgmcu::Dbgmcu;
+use crate::peripherals::dma::{Beat, Dma};
+use crate::peripherals::dmamux::Dmamux;
+use crate::peripherals::exti::Exti;
+use crate::peripherals::flash::Flash;
+use crate::peripherals::gpio::{Gpio, Mode};
+use crate::peripherals::pwr::Pwr;
+use crate::peripherals::rcc::{Bank, HSI_HZ, Rcc, ResetCause};
+use crate::peripherals::spi::Spi;
+use crate::peripherals::syscfg::Syscfg;
+use crate::peripherals::timer::Timer;
+use crate::peripherals::usb::Usb;
+use crate::peripherals::watchdog::Watchdog;
+use crate::rig::{Input, Rig};
+use crate::trace::{Edge, Kind, Pin, Trace};
+use crate::usb_host::UsbHost;
+use crate::wiring;
+
+const PORTS: usize = 7;
+/// DMAMUX request ids (RM0440, DMAMUX input table).
+const REQUEST_ADC: [u32; 2] = [5, 36];
+const REQUEST_SPI: [[u32; 2]; 2] = [[10, 11], [14, 15]];
+
+/// A general-purpose or basic timer of the part: address, clock enable, interrupt, channels, bits, name.
+const TIMERS: [(u32, Bank, u32, u32, usize, u32, &str); 9] = [
+    (0x4000_0000, Bank::Apb1, 0, 28, 4, 32, "TIM2"),
+    (0x4000_0400, Bank::Apb1, 1, 29, 4, 16, "TIM3"),
+    (0x4000_0800, Bank::Apb1, 2, 30, 4, 16, "TIM4"),
+    (0x4000_0c00, Bank::Apb1, 3, 50, 4, 32, "TIM5"),
+    (0x4000_1000, Bank::Apb1, 4, 54, 0, 16, "TIM6"),
+    (0x4000_1400, Bank::Apb1, 5, 55, 0, 16, "TIM7"),
+    (0x4001_4000, Bank::Apb2, 16, 24, 2, 16, "TIM15"),
+    (0x4001_4400, Bank::Apb2, 17, 25, 1, 16, "TIM16"),
+    (0x4001_4800, Bank::Apb2, 18, 26, 1, 16, "TIM17"),
+];
+
+/// Everything behind the address map.
+#[derive(Debug)]
+pub(crate) struct Bus {
+    /// Board time.
+    pub clock: Clock,
+    rcc: Rcc,
+    pwr: Pwr,
+    syscfg: Syscfg,
+    exti: Exti,
+    crs: Crs,
+    dbgmcu: Dbgmcu,
+    gpio: [Gpio; PORTS],
+    output_levels: [u16; PORTS],
+    timers: Vec<Timer>,
+    /// TIM1.
+    pub tim1: AdvancedTimer,
+    adc: [Adc; 2],
+    adc_common: Common,
+    spi: [Spi; 2],
+    dma: Dma,
+    dmamux: Dmamux,
+    usb: Usb,
+    /// The host at the other end of the cable.
+    pub host: UsbHost,
+    /// Flash interface.
+    pub flash: Flash,
+    watchdog: Watchdog,
+    /// Bench and sensors.
+    pub rig: Rig,
+    /// What happened so far.
+    pub trace: Trace,
+    bridge_fault: bool,
+    /// Cycle by which a fast clock must have boost mode.
+    boost_deadline: u64,
+    /// A reset that a peripheral asks for.
+    pub reset_request: Option<ResetCause>,
+    /// What ends the run.
+    pub failure: Option<BoardError>,
+    /// Accesses to registers.
+    pub accesses: u64,
+    /// DMA items moved.
+    pub dma_beats: u64,
+}
+
+impl Bus {
+    /// The board with power just applied.
+    pub(crate) fn new(rig: Rig) -> Self {
+        let mut bus = Self {
+            clock: Clock::new(HSI_HZ),
+            rcc: Rcc::new(),
+            pwr: Pwr::new(),
+            syscfg: Syscfg::new(),
+            exti: Exti::new(),
+            crs: Crs::new(),
+            dbgmcu: Dbgmcu::new(),
+            gpio: std::array::from_fn(Gpio::new),
+            output_levels: [0; PORTS],
+            timers: TIMERS.iter().map(|t| Timer::new(t.3, t.4, t.5)).collect(),
+            tim1: AdvancedTimer::new(),
+            adc: [Adc::new(), Adc::new()],
+            adc_common: Common::new(),
+            spi: [Spi::new(35), Spi::new(51)],
+            dma: Dma::new(),
+            dmamux: Dmamux::new(),
+            usb: Usb::new(),
+            host: UsbHost::new(),
+            flash: Flash::new(),
+            watchdog: Watchdog::new(),
+            rig,
+            trace: Trace::new(),
+            bridge_fault: false,
+            boost_deadline: NEVER,
+            reset_request: None,
+            failure: None,
+            accesses: 0,
+            dma_beats: 0,
+        };
+        bus.drive_fault_pin(0);
+        bus
+    }
+
+    /// Resets all peripherals at `now`; flash content and what is outside the part stay.
+    pub(crate) fn reset(&mut self, cause: ResetCause, now: u64) {
+        self.trace.event(now, Kind::Reset, &[]);
+        self.rcc.reset(cause);
+        self.clock.set_hz(now, HSI_HZ);
+        self.boost_deadline = NEVER;
+        self.pwr = Pwr::new();
+        self.syscfg = Syscfg::new();
+        self.exti = Exti::new();
+        self.crs = Crs::new();
+        self.dbgmcu = Dbgmcu::new();
+        for port in &mut self.gpio {
+            port.reset();
+        }
+        for timer in &mut self.timers {
+            timer.reset();
+        }
+        self.tim1.reset();
+        self.adc = [Adc::new(), Adc::new()];
+        self.adc_common = Common::new();
+        for spi in &mut self.spi {
+            spi.reset();
+        }
+        self.dma = Dma::new();
+        self.dmamux = Dmamux::new();
+        self.usb = Usb::new();
+        self.flash.reset();
+        self.watchdog = Watchdog::new();
+        self.reset_request = None;
+        self.pins_changed(now);
+        self.bridge_changed(now);
+    }
+
+    /// Board time at `now` \[s\].
+    pub(crate) fn seconds(&self, now: u64) -> f64 {
+        self.clock.seconds(now)
+    }
+
+    fn gpio_of(&self, pin: Pin) -> &Gpio {
+        &self.gpio[pin.port_index()]
+    }
+
+    fn pin_mode(&self, pin: Pin) -> Mode {
+        self.gpio_of(pin).mode(pin.number)
+    }
+
+    /// Level of `pin` as the outside sees it if the board pulls it to `pulled` otherwise.
+    fn pin_level(&self, pin: Pin, pulled: bool) -> bool {
+        self.gpio_of(pin).output(pin.number).unwrap_or(pulled)
+    }
+
+    /// Level that the firmware drives at `pin`, if it is a general-purpose output.
+    pub(crate) fn output(&self, pin: Pin) -> Option<bool> {
+        self.gpio.get(pin.port_index()).filter(|_| pin.number < 16)?.output(pin.number)
+    }
+
+    // ---- time -------------------------------------------------------------------------------------------------
+
+    /// Cycle of the next event of any peripheral.
+    pub(crate) fn next_event(&self) -> u64 {
+        let timers = self.timers.iter().map(Timer::next_event).min().unwrap_or(NEVER);
+        timers
+            .min(self.tim1.next_event())
+            .min(self.adc[0].next_event())
+            .min(self.adc[1].next_event())
+            .min(self.spi[0].next_event())
+            .min(self.spi[1].next_event())
+            .min(self.flash.next_event())
+            .min(self.watchdog.next_event())
+            .min(self.boost_deadline)
+            .min(self.clock.cycle_at(self.host.next_s()))
+    }
+
+    /// Does what is due at cycle `at`, which must be that of [`Self::next_event`].
+    pub(crate) fn run_event(&mut self, at: u64) {
+        for timer in &mut self.timers {
+            if timer.next_event() <= at {
+                timer.advance(at);
+            }
+        }
+        if self.tim1.next_event() <= at {
+            self.tim1.advance(at);
+            self.tim1_changed(at);
+        }
+        for index in 0..2 {
+            if self.adc[index].next_event() <= at {
+                self.run_adc(index, at);
+            }
+            if let Some(frame) = self.spi[index].due(at) {
+                let miso = self.exchange(index, frame.bits, frame.start, frame.end);
+                self.spi[index].finish(miso);
+            }
+        }
+        if self.boost_deadline <= at {
+            self.boost_deadline = NEVER;
+            self.fail(BoardError::Part {
+                part: "core supply",
+                at_s: self.seconds(at),
+                reason: format!(
+                    "SYSCLK of {} Hz without boost mode (PWR_CR5 bit 8, R1MODE, is set), expected at most 150 MHz",
+                    self.rcc.sysclk_hz()
+                ),
+            });
+        }
+        if self.flash.next_event() <= at {
+            self.flash.advance(at);
+        }
+        if self.watchdog.next_event() <= at {
+            self.watchdog = Watchdog::new();
+            self.reset_request = Some(ResetCause::Watchdog);
+        }
+        let now_s = self.seconds(at);
+        // Compared in cycles, as in `next_event`: seconds round.
+        if self.clock.cycle_at(self.host.next_s()) <= at {
+            match self.host.poll(&mut self.usb, now_s) {
+                Ok(moved) => {
+                    if !moved.out.is_empty() {
+                        self.trace.event(at, Kind::UsbOut, &moved.out);
+                    }
+                    if !moved.into.is_empty() {
+                        self.trace.event(at, Kind::UsbIn, &moved.into);
+                    }
+                }
+                Err(reason) => self.fail(BoardError::Usb { at_s: now_s, reason }),
+            }
+        }
+    }
+
+    /// Ends the run with `failure` unless it has ended already.
+    pub(crate) fn fail(&mut self, failure: BoardError) {
+        self.failure.get_or_insert(failure);
+    }
+
+    fn run_adc(&mut self, index: usize, at: u64) {
+        while self.adc[index].next_event() <= at {
+            if let Need::Sample { channel } = self.adc[index].advance(at) {
+                let code = self.sample(index, channel, at);
+                self.adc[index].hold(code);
+            }
+        }
+    }
+
+    /// Code at `channel` of ADC `index` (0 is ADC1).
+    fn sample(&mut self, index: usize, channel: u32, at: u64) -> u32 {
+        let at_s = self.seconds(at);
+        // Inputs 1, 2 and 6 to 9 lead to both converters.
+        let input = match channel {
+            1 => Input::Current,
+            2 => Input::Bus,
+            6..=9 => Input::Tension(channel as usize - 6),
+            // Internal reference, 1.212 V.
+            18 if index == 0 => return analog::code(1.212),
+            _ => {
+                self.fail(BoardError::Part {
+                    part: ["ADC1", "ADC2"][index],
+                    at_s,
+                    reason: format!("converts input {channel}, which is not wired on this board"),
+                });
+                return 0;
+            }
+        };
+        analog::code(self.rig.volts(input, at_s))
+    }
+
+    /// What SPI `index` receives for a frame.
+    fn exchange(&mut self, index: usize, bits: u32, start: u64, end: u64) -> u16 {
+        let wires = &wiring::ENCODERS[index];
+        let connected = wires.bus.iter().all(|pin| self.pin_mode(*pin) == Mode::Alternate(wires.alternate));
+        if !connected {
+            return 0xffff >> (16 - bits);
+        }
+        let (start_s, end_s, clock) = (self.seconds(start), self.seconds(end), self.spi[index].clock_mode());
+        match self.rig.encoders[index].exchange(bits, start_s, end_s, clock) {
+            Ok(miso) => miso,
+            Err(reason) => {
+                let part = self.rig.encoders[index].name();
+                self.fail(BoardError::Part { part, at_s: end_s, reason });
+                0
+            }
+        }
+    }
+
+    // ---- interrupts and DMA -----------------------------------------------------------------------------------
+
+    /// Interrupt lines that are high, bit n for interrupt n.
+    pub(crate) fn lines(&self) -> u128 {
+        let bit = |high: bool, interrupt: u32| u128::from(high) << interrupt;
+        let timers = self.timers.iter().fold(0, |lines, timer| lines | bit(timer.line(), timer.interrupt));
+        timers
+            | bit(self.tim1.break_line(), 24)
+            | bit(self.tim1.update_line(), 25)
+            | bit(self.adc[0].line() || self.adc[1].line(), 18)
+            | bit(self.spi[0].line(), self.spi[0].interrupt)
+            | bit(self.spi[1].line(), self.spi[1].interrupt)
+            | bit(self.usb.line(), 20)
+            | bit(self.flash.line(), 4)
+            | self.dma.lines()
+            | self.exti.lines()
+    }
+
+    fn requested(&self, request: u32) -> bool {
+        if let Some(index) = REQUEST_ADC.iter().position(|id| *id == request) {
+            return self.adc[index].request();
+        }
+        for (index, [receive, transmit]) in REQUEST_SPI.iter().enumerate() {
+            if request == *receive {
+                return self.spi[index].receive_request();
+            }
+            if request == *transmit {
+                return self.spi[index].transmit_request();
+            }
+        }
+        false
+    }
+
+    /// The DMA item that goes next, if any can.
+    pub(crate) fn dma_beat(&self) -> Option<Beat> {
+        let waiting = self.dma.waiting();
+        if waiting == 0 {
+            return None;
+        }
+        (0..16_usize)
+            .filter(|channel| waiting >> channel & 1 == 1 && self.requested(self.dmamux.request(*channel)))
+            .max_by_key(|channel| (self.dma.level(*channel), 16 - channel))
+            .map(|channel| self.dma.beat(channel))
+    }
+
+    /// Counts an item as moved.
+    pub(crate) fn dma_done(&mut self, channel: usize) {
+        self.dma_beats += 1;
+        self.dma.done(channel);
+    }
+
+    // ---- pins -------------------------------------------------------------------------------------------------
+
+    /// Follows the effects of new port registers.
+    fn pins_changed(&mut self, now: u64) {
+        let at_s = self.seconds(now);
+        for port in 0..PORTS {
+            let levels = self.gpio[port].outputs();
+            let changed = levels ^ self.output_levels[port];
+            self.output_levels[port] = levels;
+            for number in (0..16).filter(|number| changed >> number & 1 == 1) {
+                let high = levels >> number & 1 == 1;
+                let pin = Pin::new((b'A' + port as u8) as char, number);
+                self.trace.edge(pin, Edge { at_s, cycle: now, high });
+                if self.syscfg.exti_port(number) == port {
+                    self.exti.edge(number, high);
+                }
+            }
+        }
+        for index in 0..2 {
+            let selected = !self.pin_level(wiring::ENCODERS[index].select, true);
+            let was_selected = self.rig.encoders[index].selected();
+            if selected && !was_selected {
+                self.rig.select_encoder(index, at_s);
+            } else if !selected && was_selected {
+                let part = self.rig.encoders[index].name();
+                if let Err(reason) = self.rig.encoders[index].deselect(at_s) {
+                    self.fail(BoardError::Part { part, at_s, reason });
+                }
+            }
+        }
+        self.update_break_pin();
+        self.bridge_changed(now);
+    }
+
+    fn update_break_pin(&mut self) {
+        let connected = self.pin_mode(wiring::BRIDGE_FAULT) == Mode::Alternate(wiring::BRIDGE_ALTERNATE);
+        self.tim1.set_break_pin(!(connected && self.bridge_fault));
+    }
+
+    fn drive_fault_pin(&mut self, now: u64) {
+        let pin = wiring::BRIDGE_FAULT;
+        let level = !self.bridge_fault;
+        self.gpio[pin.port_index()].drive(pin.number, Some(level));
+        if self.syscfg.exti_port(pin.number) == pin.port_index() && now > 0 {
+            self.exti.edge(pin.number, level);
+        }
+        self.update_break_pin();
+        self.bridge_changed(now);
+    }
+
+    /// The bridge reports a fault, or no longer.
+    pub(crate) fn set_bridge_fault(&mut self, fault: bool, now: u64) {
+        if self.bridge_fault != fault {
+            self.bridge_fault = fault;
+            self.drive_fault_pin(now);
+        }
+    }
+
+    /// What bridge leg `index` does.
+    pub(crate) fn leg(&self, index: usize) -> Leg {
+        let connected = wiring::BRIDGE_LEGS[index]
+            .iter()
+            .all(|pin| self.pin_mode(*pin) == Mode::Alternate(wiring::BRIDGE_ALTERNATE));
+        if connected && self.bridge_enabled() { self.tim1.leg(index) } else { Leg::Off }
+    }
+
+    /// Whether the enable pin of the bridge is high.
+    pub(crate) fn bridge_enabled(&self) -> bool {
+        self.pin_level(wiring::BRIDGE_ENABLE, false)
+    }
+
+    fn bridge_changed(&mut self, now: u64) {
+        let legs = [self.leg(0), self.leg(1)];
+        if legs != [Leg::Off; 2] && self.tim1.dead_time_raw() == 0 {
+            self.fail(BoardError::Part {
+                part: "bridge",
+                at_s: self.seconds(now),
+                reason: "both switches of a leg alternate with dead time 0: they short the bus".to_owned(),
+            });
+        }
+        // One leg alone carries no current.
+        let bridge = match legs {
+            [Leg::Switching(a), Leg::Switching(b)] => Bridge::Duty(a - b),
+            _ => Bridge::Open,
+        };
+        let now_s = self.seconds(now);
+        self.rig.set_bridge(now_s, bridge);
+    }
+
+    fn tim1_changed(&mut self, now: u64) {
+        for _ in 0..self.tim1.take_triggers() {
+            self.adc[0].trigger(now);
+            self.adc[1].trigger(now);
+        }
+        self.bridge_changed(now);
+    }
+}

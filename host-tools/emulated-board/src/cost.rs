@@ -1,0 +1,234 @@
+//! Lower bound of the cycles of a basic block on a Cortex-M4F.
+//!
+//! Counts per instruction are those of the Cortex-M4 technical reference manual (tables of processor and FPU
+//! instruction timing), each taken at its smallest: pipeline refill P = 1, divisions 2, a load directly behind another
+//! load or store 1, instructions inside an IT block 1 (they may be skipped). Flash wait states, bus contention, cache
+//! misses and lazy FP stacking are not counted. Every instruction costs at least one cycle.
+
+/// Cycles to refill the pipeline after a branch, at least.
+const REFILL: u32 = 1;
+/// SDIV and UDIV, at least (2 to 12).
+const DIVISION: u32 = 2;
+/// VDIV.F32 and VSQRT.F32.
+const FP_DIVISION: u32 = 14;
+/// VMLA, VMLS, VFMA and their negated forms.
+const FP_MULTIPLY_ADD: u32 = 3;
+
+/// What an instruction does to the pipeline, as far as cycles go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// A fixed number of cycles.
+    Plain(u32),
+    /// A single load: 2, or 1 behind another single transfer.
+    Load,
+    /// A single store with immediate offset: 1.
+    Store,
+    /// A single store with register offset: 2, or 1 behind another single transfer.
+    StoreIndexed,
+    /// A branch that is always taken, with the cycles beside the refill.
+    Branch(u32),
+    /// A branch that may fall through.
+    ConditionalBranch,
+    /// IT, covering this many instructions.
+    IfThen(u32),
+}
+
+/// Length in bytes and class of the instruction with halfwords `first` and `second`.
+pub(crate) fn classify(first: u16, second: u16) -> (u32, Class) {
+    if first >> 11 >= 0b11101 { (4, classify_wide(first, second)) } else { (2, classify_narrow(first)) }
+}
+
+fn classify_narrow(op: u16) -> Class {
+    /// Mask, value, class; the first match counts.
+    const TABLE: &[(u16, u16, Class)] = &[
+        (0xff00, 0x4700, Class::Branch(1)),         // BX, BLX
+        (0xff87, 0x4487, Class::Branch(1)),         // ADD PC
+        (0xff87, 0x4687, Class::Branch(1)),         // MOV PC
+        (0xf800, 0x4800, Class::Load),              // LDR literal
+        (0xfe00, 0x5000, Class::StoreIndexed),      // STR register
+        (0xfe00, 0x5200, Class::StoreIndexed),      // STRH register
+        (0xfe00, 0x5400, Class::StoreIndexed),      // STRB register
+        (0xf000, 0x5000, Class::Load),              // other register offsets
+        (0xf800, 0x6000, Class::Store),             // STR
+        (0xf800, 0x6800, Class::Load),              // LDR
+        (0xf800, 0x7000, Class::Store),             // STRB
+        (0xf800, 0x7800, Class::Load),              // LDRB
+        (0xf800, 0x8000, Class::Store),             // STRH
+        (0xf800, 0x8800, Class::Load),              // LDRH
+        (0xf800, 0x9000, Class::Store),             // STR SP
+        (0xf800, 0x9800, Class::Load),              // LDR SP
+        (0xf500, 0xb100, Class::ConditionalBranch), // CBZ, CBNZ
+        (0xff00, 0xdf00, Class::Branch(1)),         // SVC
+        (0xff00, 0xde00, Class::Plain(1)),          // UDF
+        (0xf000, 0xd000, Class::ConditionalBranch), // B<cond>
+        (0xf800, 0xe000, Class::Branch(1)),         // B
+    ];
+    let registers = u32::from(op & 0xff).count_ones();
+    match op {
+        _ if op & 0xfe00 == 0xb400 => Class::Plain(1 + u32::from(op & 0x1ff).count_ones()), // PUSH
+        _ if op & 0xff00 == 0xbc00 => Class::Plain(1 + registers),                          // POP
+        _ if op & 0xff00 == 0xbd00 => Class::Branch(2 + registers),                         // POP with PC
+        _ if op & 0xf000 == 0xc000 => Class::Plain(1 + registers),                          // STM, LDM
+        _ if op & 0xff00 == 0xbf00 && op & 0x000f != 0 => Class::IfThen(4 - (op & 0xf).trailing_zeros()),
+        _ => TABLE
+            .iter()
+            .find(|(mask, value, _)| op & mask == *value)
+            .map_or(Class::Plain(1), |(_, _, class)| *class),
+    }
+}
+
+fn classify_wide(first: u16, second: u16) -> Class {
+    if first & 0xec00 == 0xec00 && second & 0x0e00 == 0x0a00 {
+        return classify_fp(first, second);
+    }
+    let count = u32::from(second).count_ones();
+    match first {
+        _ if first & 0xfe50 == 0xe810 && second & 0x8000 != 0 => Class::Branch(1 + count), // LDM with PC
+        _ if first & 0xfe40 == 0xe800 => Class::Plain(1 + count),                          // LDM, STM
+        _ if first & 0xfff0 == 0xe8d0 && second & 0xffe0 == 0xf000 => Class::Branch(2),    // TBB, TBH
+        _ if first & 0xffe0 == 0xe840 || first & 0xffe0 == 0xe8c0 => Class::Plain(2),      // exclusives
+        _ if first & 0xfe40 == 0xe840 => Class::Plain(3),                                  // LDRD, STRD
+        _ if first & 0xf800 == 0xf000 && second & 0x8000 != 0 => match second & 0xd000 {
+            0x8000 if first >> 6 & 0xf < 14 => Class::ConditionalBranch,
+            0x8000 => Class::Plain(1), // MSR, MRS, hints, barriers
+            _ => Class::Branch(1),     // B.W, BL
+        },
+        _ if first & 0xff10 == 0xf800 && first & 0x80 == 0 && second & 0x0fc0 == 0 => Class::StoreIndexed,
+        _ if first & 0xff10 == 0xf800 => Class::Store,
+        _ if first & 0xff7f == 0xf85f && second >> 12 == 15 => Class::Branch(2), // LDR PC, literal
+        _ if first & 0xff70 == 0xf850 && second >> 12 == 15 => Class::Branch(2), // LDR PC
+        _ if first & 0xfe10 == 0xf810 && second >> 12 == 15 => Class::Plain(1),  // PLD, PLI
+        _ if first & 0xfe10 == 0xf810 => Class::Load,
+        _ if first & 0xffd0 == 0xfb90 && second & 0xf0 == 0xf0 => Class::Plain(DIVISION),
+        _ => Class::Plain(1),
+    }
+}
+
+fn classify_fp(first: u16, second: u16) -> Class {
+    let double = second & 0x100 != 0;
+    if first & 0xffe0 == 0xec40 {
+        return Class::Plain(2); // VMOV of two core registers
+    }
+    if first & 0xff20 == 0xed00 {
+        return if double { Class::Plain(3) } else { Class::Plain(2) }; // VLDR, VSTR
+    }
+    if first & 0xfe00 == 0xec00 {
+        return Class::Plain(1 + u32::from(second & 0xff)); // VLDM, VSTM, VPUSH, VPOP
+    }
+    if second & 0x10 != 0 {
+        return Class::Plain(1); // VMOV, VMRS, VMSR
+    }
+    match first >> 4 & 0xb {
+        0x0 | 0x1 | 0x9 | 0xa => Class::Plain(FP_MULTIPLY_ADD),
+        0x8 => Class::Plain(FP_DIVISION),
+        0xb if first & 0xf == 1 && second & 0xc0 == 0xc0 => Class::Plain(FP_DIVISION), // VSQRT
+        _ => Class::Plain(1),
+    }
+}
+
+/// Cost of a basic block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct BlockCost {
+    /// Instructions.
+    pub instructions: u32,
+    /// Cycles if its last branch, when conditional, is not taken.
+    pub cycles: u32,
+    /// Whether it ends in a conditional branch, which costs [`TAKEN`] more when taken.
+    pub conditional: bool,
+}
+
+/// Extra cycles of a conditional branch that is taken.
+pub(crate) const TAKEN: u32 = REFILL;
+
+/// Cost of the straight-line `code`.
+pub(crate) fn block_cost(code: &[u8]) -> BlockCost {
+    let half = |at: usize| code.get(at..at + 2).map_or(0, |b| u16::from_le_bytes([b[0], b[1]]));
+    let mut cost = BlockCost::default();
+    let (mut at, mut in_it, mut behind_transfer) = (0, 0_u32, false);
+    while at < code.len() {
+        let (length, class) = classify(half(at), half(at + 2));
+        at += length as usize;
+        let single = matches!(class, Class::Load | Class::StoreIndexed | Class::Store);
+        let cycles = match class {
+            _ if in_it > 0 => 1,
+            Class::Plain(cycles) => cycles,
+            Class::Load | Class::StoreIndexed => 2 - u32::from(behind_transfer),
+            Class::Store | Class::ConditionalBranch | Class::IfThen(_) => 1,
+            Class::Branch(cycles) => cycles + REFILL,
+        };
+        // A branch inside an IT block is conditional too.
+        cost.conditional =
+            class == Class::ConditionalBranch || (in_it > 0 && matches!(class, Class::Branch(_)));
+        in_it = if let Class::IfThen(covered) = class { covered } else { in_it.saturating_sub(1) };
+        behind_transfer = single;
+        cost.instructions += 1;
+        cost.cycles += cycles;
+    }
+    debug_assert_eq!(at, code.len(), "a block ends with an instruction: {code:02x?}");
+    cost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cost(halfwords: &[u16]) -> (u32, u32, bool) {
+        let code: Vec<u8> = halfwords.iter().flat_map(|half| half.to_le_bytes()).collect();
+        let BlockCost { instructions, cycles, conditional } = block_cost(&code);
+        (instructions, cycles, conditional)
+    }
+
+    /// Encodings from the ARMv7-M architecture manual, cycles from the Cortex-M4 manual, added by hand.
+    #[test]
+    fn listed_sequences_cost_what_the_manual_says() {
+        assert_eq!(cost(&[0x1840]), (1, 1, false), "ADDS");
+        assert_eq!(cost(&[0x6808, 0x6849]), (2, 3, false), "LDR, LDR: 2 + 1");
+        assert_eq!(cost(&[0x6808, 0x1840, 0x6849]), (3, 5, false), "LDR, ADDS, LDR: 2 + 1 + 2");
+        assert_eq!(cost(&[0x6008]), (1, 1, false), "STR immediate");
+        assert_eq!(cost(&[0x5088]), (1, 2, false), "STR register");
+        assert_eq!(cost(&[0xb5f0]), (1, 6, false), "PUSH {{r4-r7, lr}}: 1 + 5");
+        assert_eq!(cost(&[0xbdf0]), (1, 7, false), "POP {{r4-r7, pc}}: 1 + 5 + 1");
+        assert_eq!(cost(&[0xe92d, 0x4ff0]), (1, 10, false), "PUSH.W {{r4-r11, lr}}: 1 + 9");
+        assert_eq!(cost(&[0xe8bd, 0x8ff0]), (1, 11, false), "POP.W {{r4-r11, pc}}: 1 + 9 + 1");
+        assert_eq!(cost(&[0xd0fe]), (1, 1, true), "BEQ");
+        assert_eq!(cost(&[0xb108]), (1, 1, true), "CBZ");
+        assert_eq!(cost(&[0xe7fe]), (1, 2, false), "B");
+        assert_eq!(cost(&[0xf000, 0xf800]), (1, 2, false), "BL");
+        assert_eq!(cost(&[0x4770]), (1, 2, false), "BX LR");
+        assert_eq!(cost(&[0xf43f, 0xaffe]), (1, 1, true), "BEQ.W");
+        assert_eq!(cost(&[0xe8df, 0xf000]), (1, 3, false), "TBB: 2 + P");
+        assert_eq!(cost(&[0xfb90, 0xf0f1]), (1, 2, false), "SDIV at least 2");
+        assert_eq!(cost(&[0xfbb0, 0xf0f1]), (1, 2, false), "UDIV at least 2");
+        assert_eq!(cost(&[0xfb80, 0x0102]), (1, 1, false), "SMULL");
+        assert_eq!(cost(&[0xfb00, 0xf001]), (1, 1, false), "MUL");
+        assert_eq!(cost(&[0xe9d0, 0x1200]), (1, 3, false), "LDRD: 1 + 2");
+        assert_eq!(cost(&[0xe850, 0x1f00]), (1, 2, false), "LDREX");
+        assert_eq!(cost(&[0xf8d0, 0x1004, 0xf8d0, 0x2008]), (2, 3, false), "LDR.W, LDR.W");
+        assert_eq!(cost(&[0xf840, 0x1002]), (1, 2, false), "STR.W register");
+        assert_eq!(cost(&[0xf840, 0x1b04]), (1, 1, false), "STR.W post-indexed");
+    }
+
+    #[test]
+    fn floating_point_costs_what_the_manual_says() {
+        assert_eq!(cost(&[0xee30, 0x0a20]), (1, 1, false), "VADD.F32");
+        assert_eq!(cost(&[0xee20, 0x0a20]), (1, 1, false), "VMUL.F32");
+        assert_eq!(cost(&[0xee00, 0x0a20]), (1, 3, false), "VMLA.F32");
+        assert_eq!(cost(&[0xeea0, 0x0a20]), (1, 3, false), "VFMA.F32");
+        assert_eq!(cost(&[0xee80, 0x0a20]), (1, 14, false), "VDIV.F32");
+        assert_eq!(cost(&[0xeeb1, 0x0ac0]), (1, 14, false), "VSQRT.F32");
+        assert_eq!(cost(&[0xeef1, 0x0ae0]), (1, 14, false), "VSQRT.F32 to an odd register");
+        assert_eq!(cost(&[0xeeb0, 0x0ac0]), (1, 1, false), "VABS.F32");
+        assert_eq!(cost(&[0xed90, 0x0a00]), (1, 2, false), "VLDR.32");
+        assert_eq!(cost(&[0xed90, 0x0b00]), (1, 3, false), "VLDR.64");
+        assert_eq!(cost(&[0xed2d, 0x8b10]), (1, 17, false), "VPUSH of 8 doubles: 1 + 16");
+        assert_eq!(cost(&[0xeef1, 0xfa10]), (1, 1, false), "VMRS");
+    }
+
+    #[test]
+    fn instructions_under_it_cost_one_and_a_branch_there_is_conditional() {
+        // ITE EQ; LDREQ; LDRNE; LDR: 1 + 1 + 1, then the last stands behind a transfer: 1.
+        assert_eq!(cost(&[0xbf0c, 0x6808, 0x6808, 0x6808]), (4, 4, false));
+        // IT EQ; BXEQ LR.
+        assert_eq!(cost(&[0xbf08, 0x4770]), (2, 2, true));
+    }
+}

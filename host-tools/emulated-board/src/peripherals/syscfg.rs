@@ -1,0 +1,47 @@
+//! System configuration: EXTI port selection; all else reads its reset value (RM0440, SYSCFG).
+
+use crate::error::{Refusal, only};
+
+/// The SYSCFG.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Syscfg {
+    exticr: [u32; 4],
+    cfgr1: u32,
+}
+
+impl Syscfg {
+    /// State behind a reset.
+    pub(crate) fn new() -> Self {
+        Self::default()
+    }
+
+    /// Port (A = 0) that EXTI line `line` (0 to 15) looks at.
+    pub(crate) fn exti_port(&self, line: u8) -> usize {
+        (self.exticr[usize::from(line / 4)] >> (4 * (line % 4)) & 0xf) as usize
+    }
+
+    /// Value of the register at `offset`.
+    pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
+        Ok(match offset {
+            0x00 | 0x18 | 0x1c => 0,
+            0x04 => self.cfgr1,
+            0x08..=0x14 => self.exticr[(offset as usize - 8) / 4],
+            _ => return Err(Refusal::no_register(offset)),
+        })
+    }
+
+    /// Writes the register at `offset`.
+    pub(crate) fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        match offset {
+            0x00 => only("MEMRMP", value, 0)?,
+            0x04 => {
+                // BOOSTEN and ANASWVDD act on analog switches at low supply only.
+                only("CFGR1", value, 0x300)?;
+                self.cfgr1 = value;
+            }
+            0x08..=0x14 => self.exticr[(offset as usize - 8) / 4] = value & 0xffff,
+            _ => return Err(Refusal::no_register(offset)),
+        }
+        Ok(())
+    }
+}

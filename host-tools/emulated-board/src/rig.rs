@@ -1,0 +1,276 @@
+//! The virtual bench behind the board's pins: bridge, amplifiers, encoders.
+//!
+//! The bench is stepped only when somebody looks or the bridge changes, so that it costs nothing in between; it lags the
+//! board by less than one step.
+
+use virtual_bench::{BenchConfig, BenchError, Bridge, Channel, ConcealedEffect, LiveBench};
+
+use crate::analog;
+use crate::encoders::{Encoder, EncoderMounting, count_at};
+use crate::faults::{Cable, EncoderAt, Injection, Rail, TensionAt};
+
+/// Volts of a broken wire at the low and at the high rail.
+const RAIL_V: [f64; 2] = [0.02, 3.28];
+
+/// What a test does to one tension channel.
+#[derive(Debug, Clone, Copy)]
+struct TensionFault {
+    wire: Option<Rail>,
+    offset_n: f64,
+    gain: f64,
+    stuck_v: Option<f64>,
+}
+
+impl Default for TensionFault {
+    fn default() -> Self {
+        Self { wire: None, offset_n: 0.0, gain: 1.0, stuck_v: None }
+    }
+}
+
+/// An input of the converter that the board wires.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Input {
+    /// Tension amplifier 1 to 4, counted from 0.
+    Tension(usize),
+    /// Current amplifier.
+    Current,
+    /// Divider of the bus voltage.
+    Bus,
+}
+
+/// Bench and sensors.
+#[derive(Debug, Clone)]
+pub(crate) struct Rig {
+    bench: LiveBench,
+    bridge: Bridge,
+    nominal_supply_v: f64,
+    pretension: [f64; 2],
+    /// Encoder at the input pulley and at the joint.
+    pub encoders: [Encoder; 2],
+    tension_faults: [TensionFault; 4],
+    current_offset_a: f64,
+    current_wire: Option<Rail>,
+}
+
+const TENSIONS: [Channel; 4] = [Channel::F1, Channel::F2, Channel::F3, Channel::F4];
+const ANGLES: [Channel; 2] = [Channel::ThetaIn, Channel::ThetaOut];
+
+fn tension_index(at: TensionAt) -> usize {
+    match at {
+        TensionAt::F1 => 0,
+        TensionAt::F2 => 1,
+        TensionAt::F3 => 2,
+        TensionAt::F4 => 3,
+    }
+}
+
+fn encoder_index(at: EncoderAt) -> usize {
+    match at {
+        EncoderAt::Input => 0,
+        EncoderAt::Joint => 1,
+    }
+}
+
+fn rail_v(rail: Rail) -> f64 {
+    match rail {
+        Rail::Low => RAIL_V[0],
+        Rail::High => RAIL_V[1],
+    }
+}
+
+impl Rig {
+    /// A bench at rest, bridge open.
+    pub(crate) fn new(
+        config: &BenchConfig,
+        effects: &[ConcealedEffect],
+        mountings: [EncoderMounting; 2],
+        seed: u64,
+    ) -> Result<Self, BenchError> {
+        let [input, joint] = mountings;
+        Ok(Self {
+            bench: LiveBench::new(config, effects, seed)?,
+            bridge: Bridge::Open,
+            nominal_supply_v: config.supply_v,
+            pretension: [1.0; 2],
+            encoders: [
+                Encoder::new("input encoder", input, seed ^ 0x5bd1_e995_0000_0001),
+                Encoder::new("joint encoder", joint, seed ^ 0x27d4_eb2f_1656_67c5),
+            ],
+            tension_faults: [TensionFault::default(); 4],
+            current_offset_a: 0.0,
+            current_wire: None,
+        })
+    }
+
+    /// The bench.
+    pub(crate) fn bench(&self) -> &LiveBench {
+        &self.bench
+    }
+
+    /// What the bridge does.
+    pub(crate) fn bridge(&self) -> Bridge {
+        self.bridge
+    }
+
+    /// Steps the bench up to board time `time_s`.
+    pub(crate) fn advance(&mut self, time_s: f64) {
+        let step_s = self.bench.config().step_s;
+        while self.bench.time_s() + step_s <= time_s {
+            self.bench.step(self.bridge);
+        }
+    }
+
+    /// Changes what the bridge does from `time_s` on.
+    pub(crate) fn set_bridge(&mut self, time_s: f64, bridge: Bridge) {
+        if bridge != self.bridge {
+            self.advance(time_s);
+            self.bridge = bridge;
+        }
+    }
+
+    /// Chip select of encoder `index` falls.
+    pub(crate) fn select_encoder(&mut self, index: usize, time_s: f64) {
+        self.advance(time_s);
+        let angle = self.bench.sensed_angle_rad(ANGLES[index]);
+        self.encoders[index].select(time_s, angle);
+    }
+
+    /// Volts at `input` at `time_s`.
+    pub(crate) fn volts(&mut self, input: Input, time_s: f64) -> f64 {
+        self.advance(time_s);
+        match input {
+            Input::Tension(index) => {
+                let fault = self.tension_faults[index];
+                let tension_n = self.bench.sensed(TENSIONS[index]) * fault.gain + fault.offset_n;
+                fault.wire.map(rail_v).or(fault.stuck_v).unwrap_or_else(|| analog::tension_v(tension_n))
+            }
+            Input::Current => {
+                let current_a = self.bench.sensed(Channel::Current) + self.current_offset_a;
+                self.current_wire.map_or_else(|| analog::current_v(current_a), rail_v)
+            }
+            Input::Bus => analog::bus_v(self.bench.supply_v()),
+        }
+    }
+
+    /// Applies `injection` (`on`) or takes it back; false if it does not concern the rig.
+    pub(crate) fn inject(&mut self, injection: Injection, on: bool, time_s: f64) -> bool {
+        self.advance(time_s);
+        match injection {
+            Injection::TensionWire(at, rail) => {
+                self.tension_faults[tension_index(at)].wire = on.then_some(rail);
+            }
+            Injection::TensionOffset(at, offset_n) => {
+                self.tension_faults[tension_index(at)].offset_n = if on { offset_n } else { 0.0 };
+            }
+            Injection::TensionGain(at, gain) => {
+                self.tension_faults[tension_index(at)].gain = if on { gain } else { 1.0 };
+            }
+            Injection::TensionStuck(at) => {
+                let index = tension_index(at);
+                let volts = analog::tension_v(self.bench.tensions_n()[index]);
+                self.tension_faults[index].stuck_v = on.then_some(volts);
+            }
+            Injection::CurrentOffset(offset_a) => self.current_offset_a = if on { offset_a } else { 0.0 },
+            Injection::CurrentWire(rail) => self.current_wire = on.then_some(rail),
+            Injection::BusVoltage(bus_v) => {
+                self.bench.set_supply_v(if on { bus_v } else { self.nominal_supply_v });
+            }
+            Injection::EncoderStuck(at) => {
+                let index = encoder_index(at);
+                let count =
+                    count_at(self.encoders[index].mounting, self.bench.sensed_angle_rad(ANGLES[index]));
+                self.encoders[index].fault.stuck_at = on.then_some(count);
+            }
+            Injection::EncoderJump(at, counts) => {
+                self.encoders[encoder_index(at)].fault.jump = if on { counts } else { 0 };
+            }
+            Injection::EncoderNoise(at, counts) => {
+                self.encoders[encoder_index(at)].fault.noise_counts = if on { counts } else { 0 };
+            }
+            Injection::EncoderBitErrors(at, probability) => {
+                self.encoders[encoder_index(at)].fault.bit_error = if on { probability } else { 0.0 };
+            }
+            Injection::EncoderSilent(at) => self.encoders[encoder_index(at)].fault.silent = on,
+            Injection::EncoderMagnetLost(at) => self.encoders[encoder_index(at)].fault.magnet_lost = on,
+            Injection::Pretension(cable, ratio) => {
+                let index = usize::from(cable == Cable::B);
+                self.pretension[index] = if on { ratio } else { 1.0 };
+                self.bench.set_pretension_ratio(self.pretension);
+            }
+            Injection::BridgeFault | Injection::HostSilent | Injection::HostNotReading => return false,
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encoders::EncoderPart;
+
+    fn rig() -> Rig {
+        let config = BenchConfig { tension_noise_n: 0.0, current_noise_a: 0.0, ..BenchConfig::default() };
+        let mounting =
+            |count_at_zero| EncoderMounting { part: EncoderPart::Amt22, count_at_zero, reversed: false };
+        Rig::new(&config, &[], [mounting(1000), mounting(2000)], 1).expect("default bench")
+    }
+
+    #[test]
+    fn at_rest_the_inputs_show_pretension_no_current_and_the_bus() {
+        let mut rig = rig();
+        // 0.50 V + 30 N · 0.023 V/N; 1.65 V; 24 V / 11.
+        for index in 0..4 {
+            assert!((rig.volts(Input::Tension(index), 0.0) - 1.19).abs() < 1e-9);
+        }
+        assert_eq!(rig.volts(Input::Current, 0.0), 1.65);
+        assert!((rig.volts(Input::Bus, 0.0) - 2.181_818).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_bench_moves_under_the_bridge_up_to_the_moment_of_a_look() {
+        let mut rig = rig();
+        rig.set_bridge(0.01, Bridge::Duty(0.2));
+        assert!(rig.volts(Input::Current, 0.0101) > 1.65, "current flows 0.1 ms behind");
+        assert!((rig.bench().time_s() - 0.0101).abs() < 2e-5);
+        rig.set_bridge(0.1, Bridge::Open);
+        assert!(rig.bench().theta_out_rad() > 0.01, "{}", rig.bench().theta_out_rad());
+        assert_eq!(rig.volts(Input::Current, 0.101), 1.65, "nothing flows through an open bridge");
+    }
+
+    #[test]
+    fn injections_come_and_go() {
+        let mut rig = rig();
+        let volts = |rig: &mut Rig, input| rig.volts(input, 0.0);
+        let f2 = Input::Tension(1);
+        for (injection, input, expected) in [
+            (Injection::TensionWire(TensionAt::F2, Rail::High), f2, 3.28),
+            (Injection::TensionOffset(TensionAt::F2, 10.0), f2, 1.42),
+            (Injection::TensionGain(TensionAt::F2, 2.0), f2, 1.88),
+            (Injection::CurrentOffset(-5.0), Input::Current, 1.05),
+            (Injection::CurrentWire(Rail::Low), Input::Current, 0.02),
+            (Injection::BusVoltage(11.0), Input::Bus, 1.0),
+        ] {
+            let before = volts(&mut rig, input);
+            assert!(rig.inject(injection, true, 0.0));
+            assert!((volts(&mut rig, input) - expected).abs() < 1e-9, "{injection:?}");
+            rig.inject(injection, false, 0.0);
+            assert_eq!(volts(&mut rig, input), before, "{injection:?}");
+        }
+        assert!(!rig.inject(Injection::BridgeFault, true, 0.0), "not the rig's");
+    }
+
+    #[test]
+    fn a_stuck_sensor_stays_while_the_bench_moves_and_a_slack_cable_loosens() {
+        let mut rig = rig();
+        rig.inject(Injection::TensionStuck(TensionAt::F1), true, 0.0);
+        rig.inject(Injection::EncoderStuck(EncoderAt::Joint), true, 0.0);
+        rig.set_bridge(0.0, Bridge::Duty(0.2));
+        assert!((rig.volts(Input::Tension(0), 0.1) - 1.19).abs() < 1e-9);
+        assert!(rig.volts(Input::Tension(1), 0.1) > 1.2);
+        assert_eq!(rig.encoders[1].fault.stuck_at, Some(2000));
+        rig.set_bridge(0.1, Bridge::Duty(0.0));
+        let tight = rig.volts(Input::Tension(3), 0.3);
+        rig.inject(Injection::Pretension(Cable::B, 0.2), true, 0.3);
+        assert!(rig.volts(Input::Tension(3), 0.5) < tight - 0.1);
+    }
+}

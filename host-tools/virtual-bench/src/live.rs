@@ -1,0 +1,235 @@
+//! A bench that is stepped from outside: for a driver board, real or emulated, instead of the lab's own controller.
+
+use crate::config::BenchConfig;
+use crate::draw::Draw;
+use crate::effects::{ActiveEffects, Channel, ConcealedEffect};
+use crate::error::BenchError;
+use crate::plant::Plant;
+
+/// What the bridge does with the motor during a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bridge {
+    /// Mean motor voltage as a fraction of the supply, −1 to 1.
+    Duty(f64),
+    /// All switches are open: the current decays to zero through the diodes, the motor is not braked.
+    Open,
+}
+
+/// The bench, its sensors and their noise, one integration step ([`BenchConfig::step_s`]) at a time.
+///
+/// Equal configurations, effects, seeds and steps give equal results, bit for bit; under [`Bridge::Duty`] they are those
+/// of [`record_driven`](crate::record_driven).
+#[derive(Debug, Clone)]
+pub struct LiveBench {
+    config: BenchConfig,
+    effects: ActiveEffects,
+    plant: Plant,
+    noise: Draw,
+    supply_v: f64,
+    steps: u64,
+}
+
+impl LiveBench {
+    /// A bench at rest at theta = 0; `seed` is the noise's.
+    ///
+    /// # Errors
+    /// [`BenchError`] if a parameter is out of range, an effect is given twice, or an effect needs a sample rate
+    /// (`sensor_lag`).
+    pub fn new(config: &BenchConfig, effects: &[ConcealedEffect], seed: u64) -> Result<Self, BenchError> {
+        config.validate()?;
+        let effects = ActiveEffects::new(effects)?;
+        if effects.sensor_lag.is_some() {
+            return Err(BenchError::NotLive { id: "sensor_lag" });
+        }
+        Ok(Self {
+            plant: Plant::new(config, effects.clone(), 0.0),
+            effects,
+            noise: Draw::new(seed, "live sensor noise"),
+            supply_v: config.supply_v,
+            steps: 0,
+            config: config.clone(),
+        })
+    }
+
+    /// One integration step.
+    pub fn step(&mut self, bridge: Bridge) {
+        match bridge {
+            Bridge::Duty(duty) => self.plant.step(duty.clamp(-1.0, 1.0)),
+            Bridge::Open => self.plant.step_open(),
+        }
+        self.steps += 1;
+    }
+
+    /// Configuration that the bench was made with.
+    pub fn config(&self) -> &BenchConfig {
+        &self.config
+    }
+
+    /// Time since the start \[s\].
+    pub fn time_s(&self) -> f64 {
+        self.steps as f64 * self.config.step_s
+    }
+
+    /// Angle of the input pulley \[rad\].
+    pub fn theta_in_rad(&self) -> f64 {
+        self.plant.input().angle_rad
+    }
+
+    /// Angle of the joint \[rad\].
+    pub fn theta_out_rad(&self) -> f64 {
+        self.plant.arm().angle_rad
+    }
+
+    /// Velocity of the joint \[rad/s\].
+    pub fn omega_out_rad_per_s(&self) -> f64 {
+        self.plant.arm().omega_rad_per_s
+    }
+
+    /// Tensions f1, f2, f3, f4 \[N\].
+    pub fn tensions_n(&self) -> [f64; 4] {
+        self.plant.tensions_n()
+    }
+
+    /// Motor current \[A\].
+    pub fn current_a(&self) -> f64 {
+        self.plant.current_a()
+    }
+
+    /// Supply of the bridge \[V\].
+    pub fn supply_v(&self) -> f64 {
+        self.supply_v
+    }
+
+    /// Changes the supply of the bridge \[V\].
+    pub fn set_supply_v(&mut self, supply_v: f64) {
+        self.supply_v = supply_v;
+        self.plant.set_supply_v(supply_v);
+    }
+
+    /// Sets the pretension of cable a and b over that of the configuration \[1\]: 1 as built, 0 a cable without any.
+    pub fn set_pretension_ratio(&mut self, ratio: [f64; 2]) {
+        self.plant.set_pretension_ratio(ratio);
+    }
+
+    /// Whether the state is finite.
+    pub fn is_finite(&self) -> bool {
+        self.tensions_n()
+            .iter()
+            .chain(&[self.theta_in_rad(), self.theta_out_rad(), self.current_a()])
+            .all(|x| x.is_finite())
+    }
+
+    /// Angle that the encoder of `channel` is at \[rad\], with its eccentricity, not quantised.
+    ///
+    /// Channels other than the two encoders read 0.
+    pub fn sensed_angle_rad(&self, channel: Channel) -> f64 {
+        let angle = match channel {
+            Channel::ThetaIn => self.theta_in_rad(),
+            Channel::ThetaOut => self.theta_out_rad(),
+            _ => return 0.0,
+        };
+        let law = self.effects.encoder_eccentricity.as_ref().filter(|law| law.channel == channel);
+        self.offset(channel, law.map_or(angle, |law| law.reading_rad(angle)))
+    }
+
+    /// Tension \[N\] or current \[A\] that the amplifier of `channel` gives out, with noise and sensor effects, neither
+    /// limited nor quantised. Each call draws new noise. Encoder channels read 0.
+    pub fn sensed(&mut self, channel: Channel) -> f64 {
+        let [f1, f2, f3, f4] = self.tensions_n();
+        let (mut value, noise) = match channel {
+            Channel::F1 => (f1, self.config.tension_noise_n),
+            Channel::F2 => (f2, self.config.tension_noise_n),
+            Channel::F3 => (f3, self.config.tension_noise_n),
+            Channel::F4 => (f4, self.config.tension_noise_n),
+            Channel::Current => (self.current_a(), self.config.current_noise_a),
+            Channel::ThetaIn | Channel::ThetaOut => return 0.0,
+        };
+        if let Some(law) = self.effects.sensor_saturation.as_ref().filter(|law| law.channel == channel) {
+            value = law.reading_n(value);
+        }
+        if let Some(law) = self.effects.sensor_gain_error.as_ref().filter(|law| law.channel == channel) {
+            value *= 1.0 + law.error;
+        }
+        self.offset(channel, value) + noise * self.noise.normal()
+    }
+
+    fn offset(&self, channel: Channel, value: f64) -> f64 {
+        let law = self.effects.sensor_offset.as_ref().filter(|law| law.channel == channel);
+        value + law.map_or(0.0, |law| law.offset)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Drive, record_driven};
+
+    #[test]
+    fn it_moves_as_a_recording_under_the_same_duty() {
+        let config = BenchConfig { tension_noise_n: 0.0, current_noise_a: 0.0, ..BenchConfig::default() };
+        let duty: Vec<f64> = (0..300).map(|k| 0.1 * (f64::from(k) * 0.02).sin()).collect();
+        let recording = record_driven(&config, &[], Drive::Duty(&duty), 1).expect("default bench");
+        let mut bench = LiveBench::new(&config, &[], 1).expect("default bench");
+        for (k, duty) in duty.iter().enumerate() {
+            // The recording rounds the current to 4 mA and the angle to 2 pi/4096: half of each at most.
+            assert!((bench.current_a() - recording.i_motor_a[k]).abs() <= 2.0e-3 + 1e-12, "sample {k}");
+            assert!((bench.theta_in_rad() - recording.theta_in_rad[k]).abs() <= 7.7e-4, "sample {k}");
+            for _ in 0..100 {
+                bench.step(Bridge::Duty(*duty));
+            }
+        }
+    }
+
+    #[test]
+    fn an_open_bridge_ends_the_current_and_does_not_brake() {
+        let mut bench = LiveBench::new(&BenchConfig::default(), &[], 1).expect("default bench");
+        for _ in 0..2000 {
+            bench.step(Bridge::Duty(0.2));
+        }
+        let (current, speed) = (bench.current_a(), bench.omega_out_rad_per_s());
+        assert!(current > 0.1 && speed > 0.1, "{current} A, {speed} rad/s");
+        // At most i·L/V = 1 A·0.8 mH/24 V = 33 us for each ampere.
+        let steps = (current * 0.8e-3 / 24.0 / 1e-5).ceil() as usize;
+        for _ in 0..steps {
+            bench.step(Bridge::Open);
+        }
+        assert_eq!(bench.current_a(), 0.0);
+        for _ in 0..10 {
+            bench.step(Bridge::Open);
+        }
+        assert_eq!(bench.current_a(), 0.0, "no braking current");
+    }
+
+    #[test]
+    fn lost_pretension_lowers_both_ends_of_that_cable_only() {
+        let mut bench = LiveBench::new(&BenchConfig::default(), &[], 1).expect("default bench");
+        bench.set_pretension_ratio([0.5, 1.0]);
+        for _ in 0..20_000 {
+            bench.step(Bridge::Duty(0.0));
+        }
+        let [f1, f2, f3, f4] = bench.tensions_n();
+        // The pulleys share the imbalance of 15 N: both cables end near its middle, a below 30 N, none above.
+        assert!(f1 < 29.0 && f2 < 29.0 && f3 < 30.0 && f4 < 30.0, "{f1} {f2} {f3} {f4}");
+    }
+
+    #[test]
+    fn supply_scales_the_motor_voltage() {
+        let settle = |supply_v: f64| {
+            let mut bench = LiveBench::new(&BenchConfig::default(), &[], 1).expect("default bench");
+            bench.set_supply_v(supply_v);
+            for _ in 0..50 {
+                bench.step(Bridge::Duty(0.1));
+            }
+            bench.current_a()
+        };
+        // Before anything moves, the current is V/R·(1 − e^(−t R/L)): proportional to the supply.
+        let ratio = settle(12.0) / settle(24.0);
+        assert!((ratio - 0.5).abs() < 0.02, "{ratio}");
+    }
+
+    #[test]
+    fn a_lag_is_refused() {
+        let effect = ConcealedEffect::drawn("sensor_lag", 1.0, 1).expect("known effect");
+        assert!(LiveBench::new(&BenchConfig::default(), &[effect], 1).is_err());
+    }
+}
