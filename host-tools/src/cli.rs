@@ -46,6 +46,14 @@ enum Command {
     Fit(FitArguments),
     /// Simulate a rig from a reference: controller, motor, joint and sensors
     Simulate(SimulateArguments),
+    /// Run the joint on a driver board along a reference and record every control tick
+    Record(crate::commands::record::RecordArguments),
+    /// Show, change, load, save and store the parameters of a driver board
+    Params(crate::commands::params::ParamsArguments),
+    /// Show the fault of a driver board, what led to it, and clear it
+    Faults(crate::commands::faults::FaultsArguments),
+    /// Send a driver board from one state to another
+    Send(crate::commands::send::SendArguments),
 }
 
 /// From now on a panic, which is a defect of this program, says one line and ends the process with exit status 1.
@@ -83,6 +91,10 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Replay(arguments) => arguments.run(),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Simulate(arguments) => arguments.run(),
+        Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Params(arguments) => arguments.run(),
+        Command::Faults(arguments) => arguments.run(),
+        Command::Send(arguments) => arguments.run(),
     }
 }
 

@@ -3,8 +3,12 @@
 pub mod check;
 pub mod convert;
 pub mod diagnose;
+pub mod faults;
 pub mod fit;
+pub mod params;
+pub mod record;
 pub mod replay;
+pub mod send;
 pub mod simulate;
 
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! Simulates, replays, fits and diagnoses recordings of tendon-driven joints.
+//! Simulates, replays, fits and diagnoses recordings of tendon-driven joints, and makes them with the driver board.
 #![forbid(unsafe_code)]
 
 pub mod cli;
@@ -6,6 +6,7 @@ pub mod commands;
 pub mod diagnose;
 pub mod fit;
 pub mod joint_model;
+pub mod link;
 pub mod marks;
 pub mod outcome;
 pub mod output;

@@ -10,6 +10,7 @@ mod columns;
 mod comma_separated;
 mod mcap_file;
 mod place;
+mod row_writer;
 mod text_column;
 
 use std::fs::File;
@@ -25,6 +26,7 @@ use crate::output;
 pub use columns::{ColumnMap, ColumnSource, TIME_ROLE};
 pub use mcap_file::TOPIC;
 pub use place::Places;
+pub use row_writer::{Cell, RowColumn, RowWriter};
 pub use text_column::TextColumn;
 
 /// Buffer between file and parser, bytes.
@@ -50,6 +52,20 @@ impl Column {
         match self {
             Self::Known { channel, .. } => channel.role(),
             Self::Unknown(text) => text.name(),
+        }
+    }
+
+    fn written(&self) -> RowColumn {
+        match self {
+            Self::Known { channel, .. } => RowColumn::Known(*channel),
+            Self::Unknown(text) => RowColumn::Unknown(text.name().to_owned()),
+        }
+    }
+
+    fn cell(&self, sample: usize) -> Cell<'_> {
+        match self {
+            Self::Known { values, .. } => Cell::Number(values[sample]),
+            Self::Unknown(text) => Cell::Text(text.cell(sample).unwrap_or_default()),
         }
     }
 }
@@ -261,14 +277,13 @@ impl Recording {
     /// A name that asks for no known format (see [`Format::for_output`]), or the reason why the medium refuses.
     pub fn save(&self, path: &Path) -> Result<(), Failure> {
         let format = Format::for_output(path)?;
-        output::write_file(path, |file| match format {
-            Format::Csv => comma_separated::write(self, file),
-            Format::GzippedCsv => {
-                let mut encoder = flate2::write::GzEncoder::new(file, flate2::Compression::default());
-                comma_separated::write(self, &mut encoder)?;
-                encoder.finish().map(|_| ())
+        let columns: Vec<RowColumn> = self.columns.iter().map(Column::written).collect();
+        output::write_file(path, |file| {
+            let mut writer = RowWriter::new(format, &columns, None, file)?;
+            for (sample, t_s) in self.t_s.iter().enumerate() {
+                writer.row(*t_s, self.columns.iter().map(|column| column.cell(sample)))?;
             }
-            Format::Mcap => mcap_file::write(self, file),
+            writer.finish()
         })
     }
 }

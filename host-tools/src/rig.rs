@@ -21,7 +21,7 @@ mod effects;
 mod parse;
 mod plausible;
 mod roles;
-mod section;
+pub(crate) mod section;
 
 use std::path::Path;
 

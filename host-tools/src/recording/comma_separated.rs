@@ -4,7 +4,8 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 
 use super::build::Table;
 use super::place::Places;
-use super::{Column, Origin, READ_BUFFER, ReadOptions, Recording, TIME_ROLE, Tail};
+use super::row_writer::Cell;
+use super::{Origin, READ_BUFFER, ReadOptions, Recording, TIME_ROLE, Tail};
 use crate::outcome::Failure;
 
 /// Reads a table as it streams past; linear in time, and no more memory than the columns that are kept.
@@ -165,39 +166,54 @@ fn mark_length(start: &[u8], source: &str) -> Result<usize, Failure> {
     Ok(if start.starts_with(UTF8_MARK) { UTF8_MARK.len() } else { 0 })
 }
 
-/// Writes a table; every number in the shortest form that reads back to the same value.
-pub(super) fn write(recording: &Recording, out: impl Write) -> io::Result<()> {
-    let mut writer = csv::WriterBuilder::new().buffer_capacity(READ_BUFFER).from_writer(out);
-    let mut cell = Vec::with_capacity(32);
-    writer.write_field(TIME_ROLE)?;
-    for column in recording.columns() {
-        writer.write_field(column.name())?;
-    }
-    writer.write_record(None::<&[u8]>)?;
-    for (sample, t_s) in recording.t_s().iter().enumerate() {
-        write_number(&mut writer, &mut cell, *t_s)?;
-        for column in recording.columns() {
-            match column {
-                Column::Known { values, .. } => write_number(&mut writer, &mut cell, values[sample])?,
-                Column::Unknown(text) => {
-                    let cell = text.cell(sample).unwrap_or_default();
-                    if cell.contains('\n') {
-                        let name = text.name();
-                        let reason = format!("column `{name}` holds a line break, which a table cannot keep");
-                        return Err(io::Error::other(reason));
-                    }
-                    writer.write_field(cell)?;
-                }
-            }
-        }
-        writer.write_record(None::<&[u8]>)?;
-    }
-    writer.flush()
+/// Writes a table row by row; every number in the shortest form that reads back to the same value.
+pub(super) struct Writer<W: Write> {
+    table: csv::Writer<W>,
+    columns: Vec<String>,
+    cell: Vec<u8>,
 }
 
-fn write_number(writer: &mut csv::Writer<impl Write>, cell: &mut Vec<u8>, value: f64) -> io::Result<()> {
-    cell.clear();
-    write!(cell, "{value:?}")?;
-    writer.write_field(&cell)?;
-    Ok(())
+impl<W: Write> Writer<W> {
+    /// Writes the header: the time and these columns.
+    pub(super) fn new<'c>(columns: impl IntoIterator<Item = &'c str>, out: W) -> io::Result<Self> {
+        let mut table = csv::WriterBuilder::new().buffer_capacity(READ_BUFFER).from_writer(out);
+        let columns: Vec<String> = columns.into_iter().map(str::to_owned).collect();
+        table.write_field(TIME_ROLE)?;
+        for column in &columns {
+            table.write_field(column)?;
+        }
+        table.write_record(None::<&[u8]>)?;
+        Ok(Self { table, columns, cell: Vec::with_capacity(32) })
+    }
+
+    /// Writes a row: the time and one cell a column.
+    pub(super) fn row<'c>(&mut self, t_s: f64, cells: impl IntoIterator<Item = Cell<'c>>) -> io::Result<()> {
+        self.write_number(format_args!("{t_s:?}"))?;
+        for (index, cell) in cells.into_iter().enumerate() {
+            match cell {
+                Cell::Number(value) => self.write_number(format_args!("{value:?}"))?,
+                Cell::Integer(value) => self.write_number(format_args!("{value}"))?,
+                Cell::Text(cell) if cell.contains('\n') => {
+                    let name = self.columns.get(index).map_or("", String::as_str);
+                    let reason = format!("column `{name}` holds a line break, which a table cannot keep");
+                    return Err(io::Error::other(reason));
+                }
+                Cell::Text(cell) => self.table.write_field(cell)?,
+            }
+        }
+        self.table.write_record(None::<&[u8]>)?;
+        Ok(())
+    }
+
+    /// Ends the table and gives back what it was written to.
+    pub(super) fn finish(self) -> io::Result<W> {
+        self.table.into_inner().map_err(csv::IntoInnerError::into_error)
+    }
+
+    fn write_number(&mut self, number: std::fmt::Arguments) -> io::Result<()> {
+        self.cell.clear();
+        self.cell.write_fmt(number)?;
+        self.table.write_field(&self.cell)?;
+        Ok(())
+    }
 }

@@ -17,7 +17,8 @@ use serde_json::value::RawValue;
 
 use super::build::Table;
 use super::place::Places;
-use super::{Column, Origin, ReadOptions, Recording, TIME_ROLE};
+use super::row_writer::{Cell, RowColumn};
+use super::{Origin, ReadOptions, Recording, TIME_ROLE};
 use crate::outcome::Failure;
 
 /// Topic of the samples.
@@ -172,37 +173,64 @@ impl<'de> Deserialize<'de> for Row<'de> {
 }
 
 /// Writes one message a sample.
-pub(super) fn write(recording: &Recording, out: impl Write + Seek) -> io::Result<()> {
-    let library = concat!("bowden ", env!("CARGO_PKG_VERSION"));
-    let mut writer = mcap::WriteOptions::new().profile("").library(library).create(out).map_err(io_error)?;
-    let schema = writer.add_schema(SCHEMA, "jsonschema", &schema_of(recording)).map_err(io_error)?;
-    let channel = writer.add_channel(schema, TOPIC, "json", &BTreeMap::new()).map_err(io_error)?;
-    let names: Vec<String> =
-        recording.columns().iter().map(|column| serde_json::Value::from(column.name()).to_string()).collect();
-    let mut data = Vec::with_capacity(512);
-    for (sample, t_s) in recording.t_s().iter().enumerate() {
-        data.clear();
-        write!(data, "{{\"{TIME_ROLE}\":{t_s:?}")?;
-        for (name, column) in names.iter().zip(recording.columns()) {
-            write!(data, ",{name}:")?;
-            match column {
-                Column::Known { values, .. } => write!(data, "{:?}", values[sample])?,
-                Column::Unknown(text) => write_text(&mut data, text.cell(sample).unwrap_or_default())?,
+pub(super) struct Writer<W: Write + Seek> {
+    file: mcap::Writer<W>,
+    channel: u16,
+    names: Vec<String>,
+    data: Vec<u8>,
+    samples: u32,
+}
+
+impl<W: Write + Seek> Writer<W> {
+    /// Writes what stands before the samples: schema, channel, and the metadata under its name, if there is any.
+    pub(super) fn new(
+        columns: &[RowColumn],
+        metadata: Option<(&str, BTreeMap<String, String>)>,
+        out: W,
+    ) -> io::Result<Self> {
+        let library = concat!("bowden ", env!("CARGO_PKG_VERSION"));
+        let mut file =
+            mcap::WriteOptions::new().profile("").library(library).create(out).map_err(io_error)?;
+        if let Some((name, metadata)) = metadata {
+            let metadata = mcap::records::Metadata { name: name.to_owned(), metadata };
+            file.write_metadata(&metadata).map_err(io_error)?;
+        }
+        let schema = file.add_schema(SCHEMA, "jsonschema", &schema_of(columns)).map_err(io_error)?;
+        let channel = file.add_channel(schema, TOPIC, "json", &BTreeMap::new()).map_err(io_error)?;
+        let names = columns.iter().map(|column| serde_json::Value::from(column.name()).to_string()).collect();
+        Ok(Self { file, channel, names, data: Vec::with_capacity(512), samples: 0 })
+    }
+
+    /// Writes a sample: the time and one cell a column.
+    pub(super) fn row<'c>(&mut self, t_s: f64, cells: impl IntoIterator<Item = Cell<'c>>) -> io::Result<()> {
+        self.data.clear();
+        write!(self.data, "{{\"{TIME_ROLE}\":{t_s:?}")?;
+        for (name, cell) in self.names.iter().zip(cells) {
+            write!(self.data, ",{name}:")?;
+            match cell {
+                Cell::Number(value) => write!(self.data, "{value:?}")?,
+                Cell::Integer(value) => write!(self.data, "{value}")?,
+                Cell::Text(text) => write_text(&mut self.data, text)?,
             }
         }
-        data.push(b'}');
+        self.data.push(b'}');
         // Casts saturate: a time before the epoch is logged at the epoch, and the property keeps it.
         let log_time = (t_s * 1e9).round() as u64;
         let header = mcap::records::MessageHeader {
-            channel_id: channel,
-            sequence: sample as u32,
+            channel_id: self.channel,
+            sequence: self.samples,
             log_time,
             publish_time: log_time,
         };
-        writer.write_to_known_channel(&header, &data).map_err(io_error)?;
+        self.samples = self.samples.wrapping_add(1);
+        self.file.write_to_known_channel(&header, &self.data).map_err(io_error)
     }
-    writer.finish().map_err(io_error)?;
-    Ok(())
+
+    /// Writes what stands behind the samples.
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        self.file.finish().map_err(io_error)?;
+        Ok(())
+    }
 }
 
 fn io_error(error: mcap::McapError) -> io::Error {
@@ -221,16 +249,19 @@ fn write_text(data: &mut Vec<u8>, cell: &str) -> io::Result<()> {
     Ok(())
 }
 
-fn schema_of(recording: &Recording) -> Vec<u8> {
+fn schema_of(columns: &[RowColumn]) -> Vec<u8> {
     let mut properties = serde_json::Map::new();
     properties
         .insert(TIME_ROLE.to_owned(), serde_json::json!({ "type": "number", "description": "time, s" }));
-    for column in recording.columns() {
+    for column in columns {
         let schema = match column {
-            Column::Known { channel, .. } => {
+            RowColumn::Known(channel) => {
                 serde_json::json!({ "type": "number", "description": channel.unit() })
             }
-            Column::Unknown(_) => serde_json::json!({}),
+            RowColumn::Described { unit, .. } => {
+                serde_json::json!({ "type": "number", "description": unit })
+            }
+            RowColumn::Unknown(_) => serde_json::json!({}),
         };
         properties.insert(column.name().to_owned(), schema);
     }

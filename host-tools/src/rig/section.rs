@@ -8,21 +8,21 @@ use toml::de::{DeTable, DeValue};
 use crate::outcome::Failure;
 
 /// A value and where it stands.
-pub(super) type Located<'t> = Spanned<DeValue<'t>>;
+pub(crate) type Located<'t> = Spanned<DeValue<'t>>;
 
 /// A string and where it stands.
-pub(super) type LocatedStr<'t> = (&'t str, Range<usize>);
+pub(crate) type LocatedStr<'t> = (&'t str, Range<usize>);
 
 /// Text of a rig file under its name.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'t> {
-    pub(super) name: &'t str,
-    pub(super) text: &'t str,
+pub(crate) struct Source<'t> {
+    pub(crate) name: &'t str,
+    pub(crate) text: &'t str,
 }
 
 impl Source<'_> {
     /// A failure at a byte range, as `file:line:column: reason`; column counts characters from 1.
-    pub(super) fn at(&self, span: &Range<usize>, reason: impl std::fmt::Display) -> Failure {
+    pub(crate) fn at(&self, span: &Range<usize>, reason: impl std::fmt::Display) -> Failure {
         let before = self.text.get(..span.start).unwrap_or(self.text);
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
@@ -32,40 +32,40 @@ impl Source<'_> {
 
 /// An accepted range.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds<'t> {
-    pub(super) lower: f64,
-    pub(super) upper: f64,
-    pub(super) unit: &'t str,
+pub(crate) struct Bounds<'t> {
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) unit: &'t str,
 }
 
 /// One table of a rig file.
 #[derive(Clone)]
-pub(super) struct Section<'t> {
-    pub(super) source: Source<'t>,
+pub(crate) struct Section<'t> {
+    pub(crate) source: Source<'t>,
     /// Name as in the file, dots included; empty for the file itself.
-    pub(super) name: &'t str,
+    pub(crate) name: &'t str,
     /// Where the table begins.
-    pub(super) span: Range<usize>,
+    pub(crate) span: Range<usize>,
     table: &'t DeTable<'t>,
 }
 
 impl<'t> Section<'t> {
-    pub(super) fn new(source: Source<'t>, name: &'t str, span: Range<usize>, table: &'t DeTable<'t>) -> Self {
+    pub(crate) fn new(source: Source<'t>, name: &'t str, span: Range<usize>, table: &'t DeTable<'t>) -> Self {
         Self { source, name, span, table }
     }
 
     /// The value of a key.
-    pub(super) fn get(&self, key: &str) -> Option<&'t Located<'t>> {
+    pub(crate) fn get(&self, key: &str) -> Option<&'t Located<'t>> {
         self.table.get(key)
     }
 
     /// Keys with their place and value.
-    pub(super) fn entries(&self) -> impl Iterator<Item = (&'t str, Range<usize>, &'t Located<'t>)> {
+    pub(crate) fn entries(&self) -> impl Iterator<Item = (&'t str, Range<usize>, &'t Located<'t>)> {
         self.table.iter().map(|(key, value)| (key.get_ref().as_ref(), key.span(), value))
     }
 
     /// Refuses the first key that is none of `known`.
-    pub(super) fn refuse_unknown<'k>(
+    pub(crate) fn refuse_unknown<'k>(
         &self,
         kind: &str,
         known: impl IntoIterator<Item = &'k str>,
@@ -79,24 +79,24 @@ impl<'t> Section<'t> {
     }
 
     /// A failure that lacks a key.
-    pub(super) fn lacks(&self, key: &str, meaning: &str) -> Failure {
+    pub(crate) fn lacks(&self, key: &str, meaning: &str) -> Failure {
         self.source.at(&self.span, format!("[{}] lacks `{key}` ({meaning}); add it", self.name))
     }
 
     /// A failure on the type of a value.
-    pub(super) fn wrong_type(&self, key: &str, value: &Located, expected: &str) -> Failure {
+    pub(crate) fn wrong_type(&self, key: &str, value: &Located, expected: &str) -> Failure {
         let got = kind_of(value.get_ref());
         let key = self.path(key);
         self.source.at(&value.span(), format!("{key}: got {got}, expected {expected}; correct it"))
     }
 
     /// Name of a key with its section.
-    pub(super) fn path(&self, key: &str) -> String {
+    pub(crate) fn path(&self, key: &str) -> String {
         if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
     }
 
     /// A sub-table.
-    pub(super) fn section(&self, key: &str, name: &'t str) -> Result<Option<Section<'t>>, Failure> {
+    pub(crate) fn section(&self, key: &str, name: &'t str) -> Result<Option<Section<'t>>, Failure> {
         let Some(value) = self.get(key) else { return Ok(None) };
         match value.get_ref() {
             DeValue::Table(table) => Ok(Some(Section::new(self.source, name, value.span(), table))),
@@ -105,7 +105,7 @@ impl<'t> Section<'t> {
     }
 
     /// A number within its range.
-    pub(super) fn number(&self, key: &str, bounds: Bounds) -> Result<Option<f64>, Failure> {
+    pub(crate) fn number(&self, key: &str, bounds: Bounds) -> Result<Option<f64>, Failure> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let number = match value.get_ref() {
             DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
@@ -129,7 +129,7 @@ impl<'t> Section<'t> {
     }
 
     /// A whole number within its range.
-    pub(super) fn integer(&self, key: &str, lower: u32, upper: u32) -> Result<Option<u32>, Failure> {
+    pub(crate) fn integer(&self, key: &str, lower: u32, upper: u32) -> Result<Option<u32>, Failure> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let DeValue::Integer(integer) = value.get_ref() else {
             return Err(self.wrong_type(key, value, "a whole number"));
@@ -144,12 +144,12 @@ impl<'t> Section<'t> {
     }
 
     /// A string and where it stands.
-    pub(super) fn string(&self, key: &str) -> Result<Option<LocatedStr<'t>>, Failure> {
+    pub(crate) fn string(&self, key: &str) -> Result<Option<LocatedStr<'t>>, Failure> {
         self.get(key).map(|value| self.as_string(key, value)).transpose()
     }
 
     /// A list of strings and where they stand.
-    pub(super) fn strings(&self, key: &str) -> Result<Option<Vec<LocatedStr<'t>>>, Failure> {
+    pub(crate) fn strings(&self, key: &str) -> Result<Option<Vec<LocatedStr<'t>>>, Failure> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let DeValue::Array(array) = value.get_ref() else {
             return Err(self.wrong_type(key, value, "a list of strings"));
@@ -166,18 +166,21 @@ impl<'t> Section<'t> {
 }
 
 /// What to do about an unknown name: the nearest known one, or all of them.
-pub(super) fn advice<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> String {
-    const NEAR: f64 = 0.8;
+pub(crate) fn advice<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> String {
     let mut known: Vec<&str> = known.into_iter().collect();
-    let nearness = |candidate: &str| strsim::jaro_winkler(&name.to_lowercase(), candidate);
-    let nearest = known.iter().copied().max_by(|a, b| nearness(a).total_cmp(&nearness(b)));
-    match nearest {
-        Some(nearest) if nearness(nearest) >= NEAR => format!("did you mean `{nearest}`?"),
-        _ => {
-            known.sort_unstable();
-            format!("expected one of {}", known.join(", "))
-        }
+    if let Some(nearest) = nearest(name, known.iter().copied()) {
+        return format!("did you mean `{nearest}`?");
     }
+    known.sort_unstable();
+    format!("expected one of {}", known.join(", "))
+}
+
+/// The known name that was probably meant.
+pub(crate) fn nearest<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
+    const NEAR: f64 = 0.8;
+    let nearness = |candidate: &str| strsim::jaro_winkler(&name.to_lowercase(), candidate);
+    let nearest = known.into_iter().max_by(|a, b| nearness(a).total_cmp(&nearness(b)))?;
+    (nearness(nearest) >= NEAR).then_some(nearest)
 }
 
 fn kind_of(value: &DeValue) -> String {

@@ -1,0 +1,228 @@
+//! Requests of the host and the parameters.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use bowden_control::parameters::Parameters;
+use bowden_control::service::{Identity, ParameterStore, Port, Reply, Service, StoreError, View};
+use bowden_control::tick::Command;
+use bowden_link::message::{Boot, Provocation};
+use bowden_link::{Accumulator, Fault, FaultRecord, FromBoard, Request, Sample, State};
+use embassy_embedded_hal::adapter::BlockingAsync;
+use embassy_futures::select::{Either, select};
+use embassy_stm32::flash::{self, Flash};
+use embassy_time::{Duration, Instant, Ticker, Timer};
+use embassy_usb::class::cdc_acm::Receiver;
+
+use crate::queues::HostEnds;
+use crate::retained::{self, Ended};
+use crate::telemetry::ANSWERS;
+use crate::usb::{PACKET, UsbDriver};
+use crate::{BOARD, bridge, encoders, tick};
+
+/// Time between two looks at the silence of the host.
+const SUPERVISION: Duration = Duration::from_millis(5);
+
+/// Longest request, bytes: 32 reference points and their stuffing.
+const REQUEST: usize = 192;
+
+/// Time that an answer gets before a failure that was asked for.
+const LAST_WORDS: Duration = Duration::from_millis(5);
+
+/// The board's flash.
+pub type BoardFlash = BlockingAsync<Flash<'static, flash::Blocking>>;
+
+/// Rounds of [`run`], for the watchdog.
+static ROUNDS: AtomicU32 = AtomicU32::new(0);
+
+/// Rounds since boot.
+pub fn rounds() -> u32 {
+    ROUNDS.load(Ordering::Relaxed)
+}
+
+/// The stored parameters; defaults if there are none, and why they could not be used if they could not.
+pub async fn load(store: &mut ParameterStore<BoardFlash>) -> (Parameters, Option<StoreError>) {
+    match store.load().await {
+        Ok(parameters) => (parameters.unwrap_or_default(), None),
+        Err(error) => (Parameters::default(), Some(error)),
+    }
+}
+
+/// What answers the host.
+pub struct Host {
+    service: Service,
+    store: ParameterStore<BoardFlash>,
+    reach: Reach,
+    incoming: Accumulator<REQUEST>,
+}
+
+/// The tick, as the service reaches it.
+struct Reach {
+    ends: HostEnds,
+    state: State,
+    fault: Option<FaultRecord>,
+}
+
+impl Port for Reach {
+    fn command(&mut self, command: Command) -> bool {
+        self.ends.commands.enqueue(command).is_ok()
+    }
+
+    fn stream_free(&self) -> usize {
+        self.ends.stream.capacity() - self.ends.stream.len()
+    }
+
+    fn stream(&mut self, point_raw: i32) -> bool {
+        self.ends.stream.enqueue(point_raw).is_ok()
+    }
+
+    fn view(&self) -> View {
+        View {
+            state: self.state,
+            fault: self.fault.filter(|_| self.state == State::Fault),
+            limits: tick::limits(),
+            tick: tick::ticks(),
+            longest_tick_cycles: tick::longest_cycles(),
+            lost: tick::lost(),
+            snapshot: retained::memory().snapshot.len() as u8,
+        }
+    }
+
+    fn snapshot(&self, index: u8) -> Option<(u32, Sample)> {
+        retained::memory().snapshot.get(usize::from(index))
+    }
+
+    fn adopt(&mut self, parameters: &Parameters) {
+        bridge::set_rate_divider(parameters.rate_divider());
+        tick::set_period_ns(parameters.period_ns());
+        encoders::set_parts(parameters.encoder_parts());
+    }
+}
+
+impl Reach {
+    /// The tick hands over a fault before it tells its state, and here the state is read first: `Fault` is never seen
+    /// without its record.
+    fn listen(&mut self) {
+        self.state = tick::state();
+        while let Some(record) = self.ends.faults.dequeue() {
+            defmt::error!(
+                "fault {=u8} channel {=u8} at tick {=u32}: {=f32}, limit {=f32}",
+                record.fault as u8,
+                record.channel,
+                record.tick,
+                record.got,
+                record.limit
+            );
+            self.fault = Some(record);
+        }
+    }
+}
+
+impl Host {
+    /// Answers with `parameters`; a fault that ended the run before, or that the store has, stops the board until the host
+    /// has cleared it.
+    pub fn new(
+        parameters: Parameters,
+        store: ParameterStore<BoardFlash>,
+        ends: HostEnds,
+        boot: Boot,
+        ended: &Ended,
+        unreadable: Option<StoreError>,
+    ) -> Self {
+        let identity = Identity { firmware: env!("CARGO_PKG_VERSION"), board: BOARD, boot };
+        let mut reach = Reach { ends, state: State::Off, fault: None };
+        let broken = unreadable.map(|_| Fault::ParameterStoreCorrupt);
+        if let Some(fault) = ended.fault.or(broken) {
+            // The queue is empty.
+            let _ = reach.command(Command::Trip(fault, 0, 1.0, 0.0));
+        }
+        let service = Service::new(identity, parameters, &ended.text);
+        Self { service, store, reach, incoming: Accumulator::default() }
+    }
+
+    async fn take(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            match self.incoming.push::<Request>(*byte) {
+                None => {}
+                Some(Err(_)) => self.service.bad_frame(),
+                Some(Ok(request)) => self.answer(&request).await,
+            }
+        }
+    }
+
+    async fn answer(&mut self, request: &Request) {
+        self.reach.listen();
+        let answer = match self.service.handle(request, now_ms(), &mut self.reach) {
+            Reply::Say(answer) => answer,
+            Reply::Store => {
+                let stored = self.store.save(self.service.parameters()).await;
+                defmt::info!("parameters stored: {=bool}", stored.is_ok());
+                Service::stored(stored.is_ok())
+            }
+            Reply::Suffer(provocation) => {
+                say(request.sequence, FromBoard::Done);
+                Timer::after(LAST_WORDS).await;
+                return suffer(provocation);
+            }
+        };
+        tick::set_telemetry(self.service.telemetry());
+        say(request.sequence, answer);
+    }
+}
+
+/// An answer that finds no room is dropped: the host does not read, and will ask again.
+fn say(request: u16, answer: FromBoard) {
+    let _ = ANSWERS.try_send((request, answer));
+}
+
+fn suffer(provocation: Provocation) {
+    defmt::warn!("provoked: {}", provocation);
+    match provocation {
+        Provocation::Panic => panic!("provoked by the host"),
+        Provocation::ProcessorFault => cortex_m::asm::udf(),
+        Provocation::Hang => critical_section::with(|_| {
+            loop {
+                cortex_m::asm::nop();
+            }
+        }),
+        Provocation::LateTick => tick::provoke_late(),
+    }
+}
+
+fn now_ms() -> u32 {
+    Instant::now().as_millis() as u32
+}
+
+/// Answers the host and watches over its silence.
+#[embassy_executor::task]
+pub async fn run(mut host: Host, mut port: Receiver<'static, UsbDriver>) {
+    let mut ticker = Ticker::every(SUPERVISION);
+    let mut packet = [0; PACKET];
+    let mut connected = false;
+    loop {
+        let heard = if connected {
+            match select(port.read_packet(&mut packet), ticker.next()).await {
+                Either::First(Ok(length)) => Some(length),
+                Either::First(Err(_)) => {
+                    connected = false;
+                    None
+                }
+                Either::Second(()) => None,
+            }
+        } else {
+            connected = matches!(select(port.wait_connection(), ticker.next()).await, Either::First(()));
+            None
+        };
+        if let Some(length) = heard {
+            host.take(&packet[..length]).await;
+        } else {
+            if !connected || !port.dtr() {
+                host.service.disconnected();
+                tick::set_telemetry(false);
+            }
+            host.reach.listen();
+            host.service.supervise(now_ms(), &mut host.reach);
+        }
+        // The only writer.
+        ROUNDS.store(ROUNDS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+}

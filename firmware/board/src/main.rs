@@ -1,0 +1,91 @@
+//! Image of the joint driver board: what belongs to this board and no other.
+//!
+//! The control law, the supervisor and the answers to the host come from `bowden-control`; the files here bring its
+//! inputs from the pins and its outputs to them.
+//!
+//! | context | priority | what |
+//! |---|---|---|
+//! | `ADC1_2` interrupt | 0 | the whole control tick ([`tick`]) |
+//! | DMA interrupts, `UART5` as executor | 1, 2 | encoders ([`encoders`]) |
+//! | `TIM5` | 3 | time |
+//! | `USB_LP` | 4 | USB |
+//! | thread | | requests and parameters ([`host`]), telemetry ([`telemetry`]), watchdog and log ([`watch`]) |
+//!
+//! Critical sections mask everything but priority 0 ([`mask`]), so nothing here delays the tick, not even a log
+//! statement; in turn, the tick shares nothing with the rest but atomics and lock-free queues.
+#![no_std]
+#![no_main]
+
+mod analog;
+mod bridge;
+mod clock;
+mod encoders;
+mod host;
+mod mask;
+mod queues;
+mod retained;
+mod stop;
+mod telemetry;
+mod tick;
+mod usb;
+mod watch;
+
+use bowden_control::service::ParameterStore;
+use defmt_rtt as _;
+use embassy_embedded_hal::adapter::BlockingAsync;
+use embassy_executor::Spawner;
+use embassy_stm32::flash::Flash;
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::wdg::IndependentWatchdog;
+
+/// Name of the board in the greeting.
+const BOARD: &str = "nucleo-g474re";
+
+/// Parameter store: the last four pages, in the bank that no code runs from.
+const STORE: core::ops::Range<u32> = 0x7_e000..0x8_0000;
+
+/// After this time without a sign of life the board is reset. Two pages erase in 44 ms (DS12288, `tERASE` 22 ms each).
+const WATCHDOG_US: u32 = 150_000;
+
+/// What would be wrong if a task did not start.
+const ONCE: &str = "each task is started once";
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    // The HAL leaves its time driver at priority 0, which critical sections do not mask.
+    interrupt::TIM5.set_priority(Priority::P3);
+    let boot = retained::boot_cause();
+    let p = clock::init();
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+    let ended = retained::take(boot);
+    defmt::info!("bowden {=str}, boot by {}, ended by {}", env!("CARGO_PKG_VERSION"), boot, ended.fault);
+
+    let flash = BlockingAsync::new(Flash::new_blocking(p.FLASH));
+    let mut store = ParameterStore::new(flash, STORE).expect("the store fits the flash");
+    let (parameters, unreadable) = host::load(&mut store).await;
+    watchdog.pet();
+
+    let rate = parameters.rate_divider();
+    let bridge = bridge::Bridge::new(p.TIM1, (p.PA8, p.PB13), (p.PA9, p.PB14), p.PB12, p.PC6, rate);
+    let analog = analog::Analog::new(p.ADC1, p.ADC2, (p.PC0, p.PC1, p.PC2, p.PC3), (p.PA0, p.PA1));
+    encoders::start(
+        encoders::Bus::new_input(p.SPI1, p.PB3, p.PB4, p.PB5, p.PA15, p.DMA1_CH1, p.DMA1_CH2),
+        encoders::Bus::new_joint(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD2, p.DMA1_CH3, p.DMA1_CH4),
+        parameters.encoder_parts(),
+    );
+    let queues = queues::split();
+    // Puts the order to stop after a bad end into the queue before the first tick.
+    let host = host::Host::new(parameters.clone(), store, queues.host, boot, &ended, unreadable);
+    tick::start(&parameters, bridge, analog, Output::new(p.PC8, Level::Low, Speed::VeryHigh), queues.tick);
+
+    let (port, device) = usb::new(p.USB, p.PA12, p.PA11);
+    let (sender, receiver) = port.split();
+    let light = Output::new(p.PA5, Level::Low, Speed::Low);
+    spawner.spawn(usb::run(device).expect(ONCE));
+    spawner.spawn(telemetry::run(sender, queues.samples).expect(ONCE));
+    spawner.spawn(host::run(host, receiver).expect(ONCE));
+    spawner.spawn(watch::run(watchdog, light).expect(ONCE));
+}

@@ -1,0 +1,36 @@
+//! The end of a run: motor off, words kept, reset.
+
+use core::panic::PanicInfo;
+
+use bowden_link::Fault;
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::{ExceptionFrame, exception};
+
+use crate::{bridge, retained};
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    bridge::off();
+    cortex_m::interrupt::disable();
+    match info.location() {
+        Some(at) => {
+            let file = at.file().rsplit('/').next().unwrap_or_default();
+            retained::keep(Fault::Panic, format_args!("{} ({file}:{})", info.message(), at.line()));
+        }
+        None => retained::keep(Fault::Panic, format_args!("{}", info.message())),
+    }
+    SCB::sys_reset()
+}
+
+#[exception]
+#[allow(unsafe_code, reason = "the macro asks for an unsafe function")]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    bridge::off();
+    // Safety: reading it changes nothing.
+    let status = unsafe { (*SCB::PTR).cfsr.read() };
+    retained::keep(
+        Fault::HardFault,
+        format_args!("at {:#010x}, called from {:#010x}, CFSR {status:#010x}", frame.pc(), frame.lr()),
+    );
+    SCB::sys_reset()
+}

@@ -1,0 +1,130 @@
+//! `bowden faults`: what a board says about its state, and what led to a fault.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use bowden_link::message::{Boot, Goal, Refusal, Status};
+use bowden_link::{Limit, Sample};
+
+use super::print;
+use crate::link::conversion::{Conversion, columns};
+use crate::link::recorder::tick_time_s;
+use crate::link::{Client, LinkError, ParameterSet, PortArguments};
+use crate::outcome::{Failure, Outcome};
+use crate::output;
+use crate::recording::{Format, RowWriter};
+
+/// Arguments of `bowden faults`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FaultsArguments {
+    #[command(flatten)]
+    port: PortArguments,
+    /// Forget the fault afterwards; the board is then off
+    #[arg(long)]
+    clear: bool,
+    /// Write the last control ticks before the fault, or before now if there is none (.csv, .csv.gz, .mcap)
+    #[arg(long, value_name = "OUT.csv")]
+    snapshot: Option<PathBuf>,
+}
+
+impl FaultsArguments {
+    /// Prints state, fault, limits and the cause of the last start; writes the snapshot; clears the fault.
+    ///
+    /// # Errors
+    /// Exit status 2, if the output or the port is not usable; 1, if the board refused or the link broke.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        if let Some(path) = &self.snapshot {
+            Format::for_output(path)?;
+            output::check_file(path, &[])?;
+        }
+        let mut client = self.port.connect()?;
+        let status = client.status()?;
+        let mut text = describe(&status);
+        let greeting = client.greeting();
+        let boot = match greeting.boot {
+            Boot::Power => "supply switched on",
+            Boot::Pin => "reset pin or debugger",
+            Boot::Software => "the firmware itself, after a panic or a processor fault",
+            Boot::Watchdog => "the watchdog",
+        };
+        let _ = writeln!(text, "firmware {} on {}, started by: {boot}", greeting.firmware, greeting.board);
+        let panic = client.panic_text()?;
+        if !panic.is_empty() {
+            let _ = writeln!(text, "panic before that: {}", crate::outcome::one_line(&panic));
+        }
+        let _ = writeln!(text, "samples of the last ticks: {}", status.snapshot);
+        let mut outcome = Outcome::done();
+        if let Some(path) = &self.snapshot {
+            outcome.extend(save_snapshot(&mut client, &status, path)?);
+        }
+        if self.clear && status.fault.is_some() {
+            client.enter(Goal::ClearFault)?;
+            text += "fault cleared\n";
+        }
+        print(&text)?;
+        Ok(outcome)
+    }
+}
+
+/// State, fault, limits and counters in lines.
+pub(super) fn describe(status: &Status) -> String {
+    let Status { state, fault, limits, tick, period_ns, longest_tick_cycles, lost, bad_frames, .. } = status;
+    let mut text = format!("state: {state}\n");
+    let _ = match fault {
+        Some(fault) => writeln!(text, "{fault}"),
+        None => writeln!(text, "no fault"),
+    };
+    let acting: Vec<&str> =
+        Limit::ALL.into_iter().filter(|limit| limits.contains(*limit)).map(Limit::title).collect();
+    let acting = if acting.is_empty() { "none".to_owned() } else { acting.join(", ") };
+    let _ = writeln!(text, "limits that act: {acting}");
+    let _ = writeln!(
+        text,
+        "tick {tick} ({:.6} s since the start), period {:.1} us, longest tick {longest_tick_cycles} cycles",
+        tick_time_s((*tick).into(), *period_ns),
+        f64::from(*period_ns) * 1e-3
+    );
+    let _ =
+        writeln!(text, "samples lost on the board: {lost}, unreadable frames from the host: {bad_frames}");
+    text
+}
+
+/// Writes what the board kept of the last ticks; returns what is missing of them.
+fn save_snapshot(client: &mut Client, status: &Status, path: &Path) -> Result<Option<String>, Failure> {
+    let format = Format::for_output(path)?;
+    let parameters = ParameterSet::read(client)?;
+    let conversion = Conversion::new(&parameters)?;
+    let mut samples: Vec<(u32, Sample)> = Vec::with_capacity(status.snapshot.into());
+    for index in 0..status.snapshot {
+        // While no fault holds them, the oldest are overwritten as they are read.
+        match client.snapshot(index) {
+            Ok((tick, sample)) if samples.last().is_none_or(|(before, _)| *before < tick) => {
+                samples.push((tick, sample));
+            }
+            Ok(_) | Err(LinkError::Refused { refusal: Refusal::NoSuchIndex, .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    let shown = path.display();
+    if samples.is_empty() {
+        return Err(Failure::failed(format!(
+            "{shown}: the board keeps no ticks yet; ask again after a fault"
+        )));
+    }
+    output::write_file(path, |file| {
+        let mut writer = RowWriter::new(format, &columns(None), None, file)?;
+        for (tick, sample) in &samples {
+            let t_s = tick_time_s((*tick).into(), status.period_ns);
+            writer.row(t_s, conversion.cells(sample, None))?;
+        }
+        writer.finish()
+    })?;
+    let consecutive = samples.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
+    let whole = consecutive && samples.len() == usize::from(status.snapshot);
+    Ok((!whole).then(|| {
+        format!(
+            "{shown}: {} ticks with gaps: control went on while they were read; only a fault holds them",
+            samples.len()
+        )
+    }))
+}

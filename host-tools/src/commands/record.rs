@@ -1,0 +1,234 @@
+//! `bowden record`: runs a joint on its board and records every control tick.
+
+use std::io;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use crate::link::conversion::{Conversion, columns};
+use crate::link::course::{Course, CourseArguments, run_seconds};
+use crate::link::recorder::{Recorder, Tally};
+use crate::link::rig_file::{self, Weight};
+use crate::link::session::{RunEnd, Session};
+use crate::link::{LinkError, ParameterSet, PortArguments, interrupt};
+use crate::outcome::{Failure, Outcome};
+use crate::output;
+use crate::progress::Progress;
+use crate::recording::{Format, RowWriter};
+
+/// Arguments of `bowden record`.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "The board checks itself and the pretension first; the bridge is off again at the end, also after an \
+                  error or Ctrl-C. t_s is the board's time since it was switched on; samples that were lost leave gaps \
+                  in it, and the exit status is 3. Beside a CSV stands NAME.parameters.toml with firmware version and \
+                  parameters; an MCAP file holds them itself."
+)]
+pub struct RecordArguments {
+    #[command(flatten)]
+    port: PortArguments,
+    /// Recording to write (.csv, .csv.gz, .mcap)
+    #[arg(long, value_name = "REC.csv")]
+    out: PathBuf,
+    /// Length of the run, s; otherwise as long as the reference file, or until Ctrl-C
+    #[arg(long, value_parser = run_seconds)]
+    seconds: Option<f64>,
+    #[command(flatten)]
+    course: CourseArguments,
+    /// Move the joint to angle zero first
+    #[arg(long)]
+    home: bool,
+    /// Set the parameters that a file names first, as `bowden params load` does
+    #[arg(long, value_name = "FILE.toml")]
+    parameters: Option<PathBuf>,
+    /// Record every N-th control tick
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    every: u64,
+    /// Write a rig file from the board's parameters, for `bowden diagnose` and the like
+    #[arg(long, value_name = "RIG.toml")]
+    rig: Option<PathBuf>,
+    /// Weight on the arm and its distance from the axis, for the rig file: the board does not know it
+    #[arg(long, value_name = "KG,M", requires = "rig")]
+    load: Option<Weight>,
+}
+
+/// Name under which an MCAP file keeps firmware version and parameters.
+const METADATA: &str = "bowden.parameters";
+
+/// Percent of a run that a step of the progress stands for.
+const PROGRESS_STEPS: u64 = 100;
+
+impl RecordArguments {
+    /// Runs and records.
+    ///
+    /// # Errors
+    /// Exit status 2, if an output or the port is not usable; 1, if the board refused, a fault stopped the joint, or the
+    /// link broke. What was recorded until then is kept.
+    pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
+        let format = Format::for_output(&self.out)?;
+        let inputs: Vec<&Path> = self.course.file().into_iter().chain(self.parameters.as_deref()).collect();
+        output::check_file(&self.out, &inputs)?;
+        let sidecar = (format != Format::Mcap).then(|| sidecar(&self.out));
+        for path in sidecar.iter().chain(&self.rig) {
+            output::check_file(path, &inputs)?;
+        }
+        if let Some(rig) = self.rig.as_ref().filter(|rig| **rig == self.out || Some(*rig) == sidecar.as_ref())
+        {
+            let rig = rig.display();
+            return Err(Failure::bad_input(format!(
+                "--rig {rig}: another output has this name; choose another"
+            )));
+        }
+        let course = self.course.course()?;
+        let seconds = match (&course, self.seconds) {
+            (_, Some(seconds)) => Some(seconds),
+            (Course::Streamed(track), None) => Some(track.duration_s()),
+            (Course::OnBoard(_), None) => None,
+        };
+        interrupt::catch()?;
+        let stop = &interrupt::requested;
+
+        let mut client = self.port.connect()?;
+        if let Some(path) = &self.parameters {
+            let parameters = ParameterSet::read(&mut client)?;
+            parameters.write(&mut client, &parameters.load(path)?)?;
+        }
+        let mut session = Session::new(client)?;
+        progress.stage("self test and pretension check", 0);
+        session.ready(stop)?;
+        if self.home {
+            progress.stage("homing", 0);
+            session.home(stop)?;
+        }
+        let conversion = Conversion::new(session.parameters())?;
+        progress.stage("recording", if seconds.is_some() { PROGRESS_STEPS } else { 0 });
+        let (tally, end) = self.record(&mut session, format, conversion, &course, seconds, progress)?;
+
+        let parameters = session.parameters();
+        if let Some(path) = &sidecar {
+            let text = parameters.to_toml();
+            output::write_file(path, |file| io::Write::write_all(file, text.as_bytes()))?;
+        }
+        if let Some(path) = &self.rig {
+            let name = self.out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
+            let text = rig_file::text(&name, parameters, tally.bus_v.unwrap_or_default(), self.load)?;
+            rig_file::save(path, &text)?;
+        }
+        let losses = *session.client().losses();
+        self.conclude(&tally, end, seconds, tally.loss(&losses))
+    }
+
+    /// Runs along the course and writes the recording; it is kept whatever ended the run, unless it is empty.
+    fn record(
+        &self,
+        session: &mut Session,
+        format: Format,
+        conversion: Conversion,
+        course: &Course,
+        seconds: Option<f64>,
+        progress: &dyn Progress,
+    ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
+        let mode = self.course.mode();
+        let metadata = session.parameters().metadata();
+        let mut end = None;
+        let mut tally = Tally::default();
+        let written = output::write_file(&self.out, |file| {
+            let writer = RowWriter::new(format, &columns(Some(mode)), Some((METADATA, metadata)), file)?;
+            let mut recorder = Recorder::new(writer, conversion, mode, self.every);
+            let mut refusal = None;
+            let mut shown = 0;
+            end = Some(session.run(mode, course, &interrupt::requested, &mut |tick| {
+                if let Err(error) = recorder.tick(tick) {
+                    refusal = Some(error);
+                    return ControlFlow::Break(());
+                }
+                let Some(seconds) = seconds else { return ControlFlow::Continue(()) };
+                let share = recorder.tally().duration_s() / seconds;
+                let step = ((share * PROGRESS_STEPS as f64) as u64).min(PROGRESS_STEPS);
+                progress.advance(step - shown);
+                shown = step;
+                // Half a nanosecond is below every control period.
+                if recorder.tally().duration_s() >= seconds - 5e-10 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            }));
+            if let Some(error) = refusal {
+                return Err(error);
+            }
+            tally = recorder.finish()?;
+            if tally.rows == 0 { Err(io::Error::other("the run gave no sample")) } else { Ok(()) }
+        });
+        match (written, end) {
+            (Ok(()), Some(end)) => Ok((tally, end)),
+            // Without a row there is nothing to keep, and what ended the run counts.
+            (Err(_), Some(Err(error))) => Err(error.into()),
+            (Err(_), Some(Ok(RunEnd::Fault(fault)))) => Err(LinkError::Fault(fault).into()),
+            (Err(_), Some(Ok(RunEnd::Interrupted))) if tally.rows == 0 => Err(LinkError::Interrupted.into()),
+            (Err(failure), _) => Err(failure),
+            (Ok(()), None) => Err(Failure::failed("the run did not begin; run it again")),
+        }
+    }
+
+    /// What the run amounts to.
+    fn conclude(
+        &self,
+        tally: &Tally,
+        end: Result<RunEnd, LinkError>,
+        seconds: Option<f64>,
+        loss: Option<String>,
+    ) -> Result<Outcome, Failure> {
+        let out = self.out.display();
+        let kept = format!("{out}: {} rows over {:.3} s are kept", tally.rows, tally.duration_s());
+        let mut outcome = Outcome::done();
+        match end {
+            Ok(RunEnd::Complete) => {}
+            Ok(RunEnd::Interrupted) => {
+                if let Some(seconds) = seconds {
+                    outcome.extend([format!("{kept}; stopped by the user before {seconds} s were over")]);
+                }
+            }
+            Ok(RunEnd::Fault(fault)) => return Err(Failure::failed(format!("{fault}; {kept}"))),
+            Ok(RunEnd::Left(state)) => {
+                return Err(Failure::failed(format!(
+                    "the board went to state {state} during the run; {kept}; see `bowden faults`"
+                )));
+            }
+            Err(error) => return Err(Failure::failed(format!("{error}; {kept}"))),
+        }
+        outcome.extend(loss.map(|loss| format!("{out}: {loss}")));
+        super::print(&format!(
+            "{out}: {} rows over {:.3} s, tick {:.1} us\n",
+            tally.rows,
+            tally.duration_s(),
+            f64::from(tally.period_ns) * 1e-3
+        ))?;
+        Ok(outcome)
+    }
+}
+
+/// File beside a recording that says which firmware and parameters made it.
+fn sidecar(out: &Path) -> PathBuf {
+    let name = out.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let stem = [".csv.gz", ".csv"]
+        .iter()
+        .find(|ending| name.to_ascii_lowercase().ends_with(*ending))
+        .map_or(name.as_str(), |ending| &name[..name.len() - ending.len()]);
+    out.with_file_name(format!("{stem}.parameters.toml"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sidecar_stands_beside_the_recording() {
+        for (out, expected) in [
+            ("a/run.csv", "a/run.parameters.toml"),
+            ("run.2.CSV.GZ", "run.2.parameters.toml"),
+            ("b/x.csv.gz", "b/x.parameters.toml"),
+        ] {
+            assert_eq!(sidecar(Path::new(out)), Path::new(expected));
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Recordings written row by row, so that memory does not grow with their length.
+
+use std::collections::BTreeMap;
+use std::io::{self, Seek, Write};
+
+use bowden_model::channel::Channel;
+use flate2::write::GzEncoder;
+
+use super::{Format, comma_separated, mcap_file};
+
+/// A column of a recording that is being written, beside the time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RowColumn {
+    /// A role.
+    Known(Channel),
+    /// A number that is no role.
+    Described {
+        /// Name in the header.
+        name: String,
+        /// Unit, where the format has a place for it.
+        unit: String,
+    },
+    /// Anything.
+    Unknown(String),
+}
+
+impl RowColumn {
+    /// A number that is no role.
+    pub fn described(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self::Described { name: name.into(), unit: unit.into() }
+    }
+
+    /// Name as it stands in a header.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Known(channel) => channel.role(),
+            Self::Described { name, .. } | Self::Unknown(name) => name,
+        }
+    }
+}
+
+/// One value of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cell<'c> {
+    /// A number, written in the shortest form that reads back to the same value.
+    Number(f64),
+    /// A whole number.
+    Integer(i64),
+    /// Text that is not interpreted.
+    Text(&'c str),
+}
+
+/// Writes a recording in any format.
+pub struct RowWriter<W: Write + Seek>(Form<W>);
+
+enum Form<W: Write + Seek> {
+    Csv(comma_separated::Writer<W>),
+    GzippedCsv(comma_separated::Writer<GzEncoder<W>>),
+    Mcap(Box<mcap_file::Writer<W>>),
+}
+
+impl<W: Write + Seek> RowWriter<W> {
+    /// Writes what stands before the rows. Formats without a place for `metadata`, a name and its entries, drop it.
+    ///
+    /// # Errors
+    /// The reason why `out` refuses; the same holds for the other calls.
+    pub fn new(
+        format: Format,
+        columns: &[RowColumn],
+        metadata: Option<(&str, BTreeMap<String, String>)>,
+        out: W,
+    ) -> io::Result<Self> {
+        let names = columns.iter().map(RowColumn::name);
+        Ok(Self(match format {
+            Format::Csv => Form::Csv(comma_separated::Writer::new(names, out)?),
+            Format::GzippedCsv => {
+                let encoder = GzEncoder::new(out, flate2::Compression::default());
+                Form::GzippedCsv(comma_separated::Writer::new(names, encoder)?)
+            }
+            Format::Mcap => Form::Mcap(Box::new(mcap_file::Writer::new(columns, metadata, out)?)),
+        }))
+    }
+
+    /// Writes a row: the time, s, and one cell a column.
+    ///
+    /// # Errors
+    /// The reason why the medium refuses.
+    pub fn row<'c>(&mut self, t_s: f64, cells: impl IntoIterator<Item = Cell<'c>>) -> io::Result<()> {
+        match &mut self.0 {
+            Form::Csv(writer) => writer.row(t_s, cells),
+            Form::GzippedCsv(writer) => writer.row(t_s, cells),
+            Form::Mcap(writer) => writer.row(t_s, cells),
+        }
+    }
+
+    /// Writes what stands behind the rows.
+    ///
+    /// # Errors
+    /// The reason why the medium refuses.
+    pub fn finish(self) -> io::Result<()> {
+        match self.0 {
+            Form::Csv(writer) => writer.finish()?.flush(),
+            Form::GzippedCsv(writer) => writer.finish()?.finish()?.flush(),
+            Form::Mcap(writer) => writer.finish(),
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Ports that are no board: one line says what is wrong and what to do, exit status 2.
+
+use std::time::Duration;
+
+use crate::bowden;
+use crate::fake::{Fake, Mishaps};
+use crate::wires::Terminal;
+
+fn assert_refused(arguments: &[&str], expected: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("notes.txt"), "no port").unwrap();
+    let (status, stdout, stderr) = bowden(folder.path(), arguments);
+    assert_eq!(stderr, format!("bowden: {expected}\n"), "{arguments:?}");
+    assert_eq!((status, stdout.as_str()), (2, ""), "{arguments:?}");
+}
+
+#[test]
+fn what_is_no_port_is_named() {
+    assert_refused(
+        &["send", "--port", "/dev/ttyACM99", "status"],
+        "/dev/ttyACM99: there is no such port; check the cable, or use --port auto",
+    );
+    assert_refused(
+        &["faults", "--port", "notes.txt"],
+        "notes.txt: this is no serial port; name one such as /dev/ttyACM0, or auto, or sim",
+    );
+}
+
+#[test]
+fn no_board_on_usb_is_told_with_what_was_sought() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, _, stderr) = bowden(folder.path(), &["params", "--port", "auto"]);
+    assert_eq!(status, 2);
+    assert!(stderr.starts_with("bowden: auto: no USB device 1209:b0d7 found ("), "{stderr}");
+    assert!(stderr.ends_with("); check the cable, or name the port\n"), "{stderr}");
+}
+
+#[test]
+fn a_port_that_another_program_has_open_is_told() {
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    let port = terminal.port();
+    let _other = serialport::new(port, 115_200).timeout(Duration::from_secs(1)).open().unwrap();
+    let expected = format!("{port}: another program has the port open; close that one first");
+    assert_refused(&["send", "--port", port, "status"], &expected);
+}
+
+#[test]
+fn a_port_without_a_board_behind_it_is_given_up() {
+    let terminal = Terminal::new(Fake::new(Mishaps { silent: true, ..Mishaps::default() }));
+    let port = terminal.port();
+    let expected = format!(
+        "{port}: no greeting within 0.3 s, expected a bowden driver board; check the port and the board's supply, or reset \
+         the board"
+    );
+    assert_refused(&["send", "--port", port, "--timeout", "0.3", "ready"], &expected);
+}
+
+#[test]
+fn a_board_of_another_version_is_not_talked_to() {
+    let terminal = Terminal::new(Fake::new(Mishaps { protocol_version: Some(7), ..Mishaps::default() }));
+    let port = terminal.port();
+    let expected = format!(
+        "{port}: firmware 9.8.7 speaks protocol version 7, expected 1; use the bowden that belongs to this firmware"
+    );
+    assert_refused(&["record", "--port", port, "--out", "a.csv", "--seconds", "1"], &expected);
+    assert_eq!(terminal.fake().carried_out.len(), 1);
+}
+
+#[test]
+fn what_cannot_be_done_is_told_before_the_port_is_opened() {
+    let record = |arguments: &[&'static str]| -> Vec<&'static str> {
+        [&["record", "--port", "/dev/ttyACM99"], arguments].concat()
+    };
+    assert_refused(
+        &record(&["--out", "a.txt"]),
+        "a.txt: unknown format; end the name in .csv, .csv.gz or .mcap",
+    );
+    assert_refused(
+        &record(&["--out", "a.csv", "--reference", "sinus"]),
+        "--reference sinus: neither a file nor one of hold, sine, triangle, multisine, staircase; correct it",
+    );
+    assert_refused(
+        &record(&["--out", "a.csv", "--rig", "a.parameters.toml"]),
+        "--rig a.parameters.toml: another output has this name; choose another",
+    );
+    assert_refused(
+        &record(&["--out", "a.csv", "--amplitude", "inf"]),
+        "--amplitude inf: expected a finite number; give one",
+    );
+    assert_refused(
+        &record(&["--out", "a.csv", "--rig", "r.toml", "--load", "2.5"]),
+        "invalid value '2.5' for '--load <KG,M>': expected KG,M such as 2.5,0.03; see `bowden --help`",
+    );
+    assert_refused(
+        &["faults", "--port", "/dev/ttyACM99", "--snapshot", "nowhere/s.csv"],
+        "nowhere/s.csv: folder nowhere does not exist; create it first",
+    );
+}
+
+#[test]
+fn a_reference_file_without_its_column_is_told_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("r.csv"), "t_s,theta_ref_rad,torque_ref_nm\n0,0,0\n1,0,much\n")
+        .unwrap();
+    std::fs::write(folder.path().join("q.csv"), "t_s,f1_n\n0,0\n1,0\n").unwrap();
+    for (file, mode, expected) in [
+        (
+            "r.csv",
+            "torque",
+            "r.csv:3: column `torque_ref_nm`: got `much`, expected a finite number; correct it",
+        ),
+        (
+            "q.csv",
+            "torque",
+            "q.csv: no column `torque_ref_nm`, which this mode follows; name the reference so",
+        ),
+        (
+            "q.csv",
+            "position",
+            "q.csv: no column `theta_ref_rad`, which this mode follows; name the reference so",
+        ),
+    ] {
+        let arguments = ["--out", "a.csv", "--mode", mode, "--reference", file];
+        let (status, _, stderr) =
+            bowden(folder.path(), &[&["record", "--port", "sim"], arguments.as_slice()].concat());
+        assert_eq!((status, stderr), (2, format!("bowden: {expected}\n")));
+    }
+}

@@ -1,0 +1,247 @@
+//! The commands with `--port sim`: the board's own control with a simulated joint, only the wire in between.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::fs;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use bowden::link::course::{Course, Track};
+use bowden::link::sim::SimTransport;
+use bowden::link::{Client, RunEnd, Session};
+use bowden::recording::{Column, ReadOptions, Recording};
+use bowden_link::State;
+use bowden_link::message::{Goal, Mode};
+use bowden_model::channel::Channel;
+
+use crate::bowden;
+use crate::wires::{Lossy, TIMEOUT};
+
+fn raw(recording: &Recording, name: &str) -> Vec<f64> {
+    let Some(Column::Unknown(text)) = recording.columns().iter().find(|column| column.name() == name) else {
+        panic!("no column {name}");
+    };
+    (0..recording.len()).map(|row| text.cell(row).unwrap().parse().unwrap()).collect()
+}
+
+#[test]
+fn a_recording_of_the_simulated_joint_follows_its_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "record",
+        "--port",
+        "sim",
+        "--out",
+        "a.csv",
+        "--seconds",
+        "1.5",
+        "--home",
+        "--reference",
+        "sine",
+        "--amplitude",
+        "0.3",
+        "--frequency",
+        "1",
+        "--rig",
+        "rig.toml",
+        "--load",
+        "2.5,0.03",
+    ];
+    let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    assert_eq!(stdout, "a.csv: 15000 rows over 1.500 s, tick 100.0 us\n");
+    let (status, stdout, stderr) = bowden(folder.path(), &["check", "a.csv", "--rig", "rig.toml"]);
+    assert_eq!((status, stderr.as_str()), (0, ""), "{stdout}");
+
+    let recording = Recording::load(&folder.path().join("a.csv"), &ReadOptions::default()).unwrap();
+    let channel = |channel| recording.channel(channel).unwrap();
+    let (reference, joint) = (channel(Channel::ThetaRef), channel(Channel::ThetaOut));
+    // After the run-in the joint is where it should be, within a tenth of the amplitude.
+    let late = 7500..15_000;
+    let worst = late.clone().map(|row| (reference[row] - joint[row]).abs()).fold(0.0, f64::max);
+    assert!(worst < 0.03, "{worst} rad from the reference");
+    let reach = late.map(|row| joint[row].abs()).fold(0.0, f64::max);
+    assert!(reach > 0.25, "the joint reaches {reach} rad");
+    // By hand from the front end: zero 1000, 0.5 V and 23 mV/N behind 3.3 V in 4095 steps, 120 mV/A around 1.65 V.
+    let (counts, codes, currents) =
+        (raw(&recording, "encoder_in_count_raw"), raw(&recording, "f3_raw"), raw(&recording, "current_raw"));
+    for row in 0..recording.len() {
+        let angle = (counts[row] - 1000.0) * TAU / 4096.0;
+        assert!((channel(Channel::ThetaIn)[row] - angle).abs() < 1e-8, "row {row}");
+        let tension = (codes[row] * 3.3 / 4095.0 - 0.5) / 0.023;
+        // The parameters have four digits of zero and five of gain: 0.0455 codes and 1.2e-5 of up to 60 N.
+        assert!((channel(Channel::F3)[row] - tension).abs() < 2.4e-3, "row {row}: {tension} N");
+        let current = (currents[row] * 3.3 / 4095.0 - 1.65) / 0.12;
+        assert!((channel(Channel::MotorCurrent)[row] - current).abs() < 1e-3, "row {row}: {current} A");
+    }
+    // The tendons carry their pretension and the load, and none is slack.
+    let mean = channel(Channel::F1).iter().sum::<f64>() / recording.len() as f64;
+    assert!((25.0..40.0).contains(&mean), "{mean} N in the mean");
+}
+
+#[test]
+fn equal_runs_are_equal_and_thinned_rows_are_the_same_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    for (out, every) in [("a.csv", "1"), ("b.csv", "1"), ("c.csv", "7"), ("d.mcap", "7")] {
+        let arguments = [
+            "record",
+            "--port",
+            "sim",
+            "--out",
+            out,
+            "--seconds",
+            "0.2",
+            "--every",
+            every,
+            "--offset",
+            "0.1",
+        ];
+        let (status, _, stderr) = bowden(folder.path(), &arguments);
+        assert_eq!((status, stderr.as_str()), (0, ""), "{out}");
+    }
+    let text = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    assert_eq!(text("a.csv"), text("b.csv"));
+    let (whole, thinned) = (text("a.csv"), text("c.csv"));
+    let expected: Vec<&str> = whole.lines().take(1).chain(whole.lines().skip(1).step_by(7)).collect();
+    assert_eq!(thinned.lines().collect::<Vec<_>>(), expected);
+    let load = |name: &str| Recording::load(&folder.path().join(name), &ReadOptions::default()).unwrap();
+    assert_eq!(load("c.csv"), load("d.mcap"));
+}
+
+#[test]
+fn a_file_is_followed_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "t_s,theta_ref_rad\n".to_owned();
+    for sample in 0..=160 {
+        let t_s = f64::from(sample) * 0.01;
+        writeln!(text, "{t_s},{}", 0.1 * (1.0 - (TAU * t_s / 1.6).cos())).unwrap();
+    }
+    fs::write(folder.path().join("ref.csv"), text).unwrap();
+    let arguments = ["record", "--port", "sim", "--out", "a.csv", "--reference", "ref.csv"];
+    let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    assert!(stdout.starts_with("a.csv: 16000 rows over 1.600 s"), "{stdout}");
+    let recording = Recording::load(&folder.path().join("a.csv"), &ReadOptions::default()).unwrap();
+    let reference = recording.channel(Channel::ThetaRef).unwrap();
+    // The file's peak is 0.2 rad at half time, after the half second in which the board blends a reference in; the
+    // stream runs 1000 points a second, begun some ticks into the run.
+    let peak = reference.iter().copied().fold(0.0, f64::max);
+    assert!((peak - 0.2).abs() < 2e-3, "{peak} rad");
+    let at = reference.iter().position(|value| *value == peak).unwrap();
+    assert!((7900..8300).contains(&at), "row {at}");
+}
+
+#[test]
+fn a_torque_run_records_the_torque_that_was_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "record",
+        "--port",
+        "sim",
+        "--out",
+        "a.csv",
+        "--seconds",
+        "0.5",
+        "--mode",
+        "torque",
+        "--offset",
+        "0.1",
+    ];
+    let (status, _, stderr) = bowden(folder.path(), &arguments);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let recording = Recording::load(&folder.path().join("a.csv"), &ReadOptions::default()).unwrap();
+    let reference = raw(&recording, "torque_ref_nm");
+    assert!((reference.last().unwrap() - 0.1).abs() < 1e-5, "{:?}", reference.last());
+    assert_eq!(recording.channel(Channel::ThetaRef), None);
+}
+
+#[test]
+fn the_boards_own_services_take_repeated_points_once() {
+    let wire = Lossy::new(SimTransport::new(), 2);
+    let mut client = Client::connect(Box::new(wire), "sim", TIMEOUT).unwrap();
+    client.enter(Goal::Ready).unwrap();
+    while client.status().unwrap().state != State::Ready {
+        client.listen(Duration::from_millis(20)).unwrap();
+    }
+    // Points wait for a run that follows them; here it holds where it is.
+    client.enter(Goal::Run(Mode::Position)).unwrap();
+    let all = client.stream(&[]).unwrap();
+    let mut free = all;
+    for _ in 0..5 {
+        free = client.stream(&[0.25; 20]).unwrap();
+    }
+    assert_eq!(free, all - 100);
+    let losses = client.losses();
+    assert!(losses.frames >= 5, "{losses:?}");
+}
+
+#[test]
+fn a_simulated_board_has_parameters_and_states_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, stdout, _) =
+        bowden(folder.path(), &["params", "--port", "sim", "get", "supervisor.host_timeout"]);
+    assert_eq!(status, 0);
+    assert!(stdout.starts_with("supervisor.host_timeout  0.5 s "), "{stdout}");
+    let (status, stdout, _) = bowden(folder.path(), &["send", "--port", "sim", "ready"]);
+    assert_eq!((status, stdout.as_str()), (0, "state: ready\n"));
+    let (status, stdout, _) = bowden(folder.path(), &["faults", "--port", "sim"]);
+    assert_eq!(status, 0);
+    assert!(stdout.starts_with("state: off\nno fault\n"), "{stdout}");
+}
+
+#[test]
+fn a_fault_of_the_control_itself_ends_the_recording_in_its_tick() {
+    let folder = tempfile::tempdir().unwrap();
+    // At rest the ends carry 30 N, in motion one of them soon less than 25 N.
+    let parameters = "schema = \"bowden-parameters/1\"\n[tension]\nslack = 25.0\n";
+    fs::write(folder.path().join("p.toml"), parameters).unwrap();
+    let arguments = ["--out", "a.csv", "--seconds", "2", "--reference", "sine", "--parameters", "p.toml"];
+    let (status, stdout, stderr) =
+        bowden(folder.path(), &[&["record", "--port", "sim"], arguments.as_slice()].concat());
+    assert_eq!((status, stdout.as_str()), (1, ""), "{stderr}");
+    let recording = Recording::load(&folder.path().join("a.csv"), &ReadOptions::default()).unwrap();
+    let tick = (recording.t_s().last().unwrap() * 1e4).round();
+    assert!(stderr.starts_with("bowden: fault 11, f"), "{stderr}");
+    assert!(
+        stderr.contains(&format!("limit 25.0000 N) at tick {tick}; restore the pretension; a.csv: ")),
+        "{stderr}"
+    );
+    let enabled = recording.channel(Channel::DriveEnable).unwrap();
+    assert_eq!(enabled[enabled.len() - 2..], [1.0, 0.0]);
+    // Where the tension was below the limit, it had been for the debounce of 1 ms.
+    let slack = [Channel::F1, Channel::F2, Channel::F3, Channel::F4].into_iter().any(|channel| {
+        let tension = recording.channel(channel).unwrap();
+        tension[tension.len() - 5..].iter().all(|tension| *tension < 25.0)
+    });
+    assert!(slack);
+    let saved = fs::read_to_string(folder.path().join("a.parameters.toml")).unwrap();
+    assert!(saved.contains("\ntension.slack = 25.0  # N"), "{saved}");
+}
+
+#[test]
+fn points_that_an_interrupted_run_left_are_not_followed_by_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let track = |name: &str, value: f64| {
+        let path = folder.path().join(name);
+        fs::write(&path, format!("t_s,theta_ref_rad\n0,{value}\n1,{value}\n")).unwrap();
+        Course::Streamed(Track::load(&path, Mode::Position).unwrap())
+    };
+    let (high, low) = (track("high.csv", 0.2), track("low.csv", 0.0));
+    let client = Client::connect(Box::new(SimTransport::new()), "sim", TIMEOUT).unwrap();
+    let mut session = Session::new(client).unwrap();
+    let mut highest = [0.0_f64; 2];
+    for (course, highest) in [high, low].iter().zip(&mut highest) {
+        session.ready(&|| false).unwrap();
+        session.home(&|| false).unwrap();
+        let mut count = 0;
+        let end = session.run(Mode::Position, course, &|| false, &mut |tick| {
+            *highest = highest.max(f64::from(tick.sample.reference_raw) / 1_048_576.0);
+            count += 1;
+            if count == 6000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert_eq!(end, Ok(RunEnd::Complete));
+    }
+    assert!(highest[0] > 0.19, "{highest:?}");
+    // Homing ends within 0.02 rad of zero.
+    assert!(highest[1] < 0.05, "{highest:?}");
+}

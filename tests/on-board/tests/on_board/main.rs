@@ -1,0 +1,26 @@
+//! The release images on the emulated board.
+
+mod boot;
+mod closed_loop;
+mod conformance;
+
+use bowden_board::Board;
+use bowden_link::message::{Reference, Shape};
+use bowden_on_board_tests::host::Host;
+use bowden_on_board_tests::{Outcome, image};
+
+/// A board with power just applied and a host that has greeted it.
+fn switched_on(seed: u64) -> Outcome<Host> {
+    Host::connect(Board::builder(&image::firmware()?).seed(seed).build()?)
+}
+
+/// The same, tested and ready.
+fn ready(seed: u64) -> Outcome<Host> {
+    let mut host = switched_on(seed)?;
+    host.make_ready()?;
+    Ok(host)
+}
+
+/// 0.5 rad at 0.2 Hz.
+const SINE: Reference =
+    Reference::Generated { shape: Shape::Sine, amplitude: 0.5, offset: 0.0, frequency_hz: 0.2 };
