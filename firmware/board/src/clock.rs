@@ -1,6 +1,5 @@
 //! Clocks: 170 MHz from the internal oscillator, 48 MHz for USB trimmed by the host's frames.
 
-use embassy_stm32::interrupt::Priority;
 use embassy_stm32::rcc::{Hsi48Config, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux};
 use embassy_stm32::{Config, Peripherals, pac};
 
@@ -39,6 +38,5 @@ fn config() -> Config {
     config.rcc.boost = true;
     config.rcc.mux.adc12sel = mux::Adcsel::SYS;
     config.rcc.mux.clk48sel = mux::Clk48sel::HSI48;
-    config.bdma_interrupt_priority = Priority::P1;
     config
 }

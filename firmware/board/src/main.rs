@@ -6,9 +6,9 @@
 //! | context | priority | what |
 //! |---|---|---|
 //! | `ADC1_2` interrupt | 0 | the whole control tick ([`tick`]) |
-//! | DMA interrupts, `UART5` as executor | 1, 2 | encoders ([`encoders`]) |
-//! | `TIM5` | 3 | time |
-//! | `USB_LP` | 4 | USB |
+//! | `TIM7` interrupt | 1 | encoder frames ([`encoders`]) |
+//! | `TIM5` interrupt | 3 | time |
+//! | `USB_LP` interrupt | 4 | USB |
 //! | thread | | requests and parameters ([`host`]), telemetry ([`telemetry`]), watchdog and log ([`watch`]) |
 //!
 //! Critical sections mask everything but priority 0 ([`mask`]), so nothing here delays the tick, not even a log
@@ -19,6 +19,7 @@
 mod analog;
 mod bridge;
 mod clock;
+mod encoder_bus;
 mod encoders;
 mod host;
 mod mask;
@@ -38,6 +39,7 @@ use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::wdg::IndependentWatchdog;
 
 /// Name of the board in the greeting.
@@ -71,11 +73,10 @@ async fn main(spawner: Spawner) {
     let rate = parameters.rate_divider();
     let bridge = bridge::Bridge::new(p.TIM1, (p.PA8, p.PB13), (p.PA9, p.PB14), p.PB12, p.PC6, rate);
     let analog = analog::Analog::new(p.ADC1, p.ADC2, (p.PC0, p.PC1, p.PC2, p.PC3), (p.PA0, p.PA1));
-    encoders::start(
-        encoders::Bus::new_input(p.SPI1, p.PB3, p.PB4, p.PB5, p.PA15, p.DMA1_CH1, p.DMA1_CH2),
-        encoders::Bus::new_joint(p.SPI3, p.PC10, p.PC11, p.PC12, p.PD2, p.DMA1_CH3, p.DMA1_CH4),
-        parameters.encoder_parts(),
-    );
+    let [at_input, at_joint] = &encoder_bus::BUSES;
+    at_input.adopt(Spi::new_blocking(p.SPI1, p.PB3, p.PB5, p.PB4, spi::Config::default()), p.PA15);
+    at_joint.adopt(Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, spi::Config::default()), p.PD2);
+    encoders::start(parameters.encoder_parts());
     let queues = queues::split();
     // Puts the order to stop after a bad end into the queue before the first tick.
     let host = host::Host::new(parameters.clone(), store, queues.host, boot, &ended, unreadable);

@@ -75,11 +75,13 @@ struct Orders<'t> {
 }
 
 impl Inbox for Orders<'_> {
-    fn command(&mut self) -> Option<Command> {
-        match self.late.take() {
-            Some(periods) => Some(Command::Trip(Fault::TickOverrun, 0, periods, 1.0)),
-            None => self.ends.commands.dequeue(),
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        if let Some(periods) = self.late.take() {
+            return Some(act(&Command::Trip(Fault::TickOverrun, 0, periods, 1.0)));
         }
+        let done = act(self.ends.commands.peek()?);
+        self.ends.commands.dequeue();
+        Some(done)
     }
 
     fn stream_point(&mut self) -> Option<i32> {

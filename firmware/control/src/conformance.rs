@@ -92,7 +92,8 @@ pub fn compensator_digest(seed: u32, inputs: u32) -> u32 {
         };
         let mut state = CompensatorState::default();
         for _ in 0..INPUTS_A_SET {
-            let input = if random.rarely(4) { edges.input(&mut random) } else { compensator_input(&mut random) };
+            let input =
+                if random.rarely(4) { edges.input(&mut random) } else { compensator_input(&mut random) };
             let output = compensate(&compensator, &mut state, &input);
             hash.word(output.theta_c.to_bits().cast_unsigned());
             hash.word(output.theta_f.to_bits().cast_unsigned());
@@ -249,8 +250,8 @@ struct Orders {
 }
 
 impl Inbox for Orders {
-    fn command(&mut self) -> Option<Command> {
-        self.command.take()
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        self.command.take().map(|command| act(&command))
     }
 
     fn stream_point(&mut self) -> Option<i32> {

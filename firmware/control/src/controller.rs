@@ -87,7 +87,7 @@ impl Controller {
         let tick = self.ticks;
         self.ticks = tick.wrapping_add(1);
         let mut limits = Limits::default();
-        let ordered = inbox.command().and_then(|command| self.take(&command));
+        let ordered = inbox.command(|command| self.take(command)).flatten();
         let readings = self.sense(input, &mut limits);
         let mut found = ordered.or(readings.found);
         if found.is_none() {
@@ -140,7 +140,7 @@ impl Controller {
                         self.observer = Observer::default();
                     }
                 }
-                self.config = *config;
+                self.config.copy_from(config);
                 None
             }
             Command::Enter(goal) => {

@@ -212,7 +212,7 @@ mod tests {
     struct Points(VecDeque<i32>);
 
     impl Inbox for Points {
-        fn command(&mut self) -> Option<Command> {
+        fn command<R>(&mut self, _: impl FnOnce(&Command) -> R) -> Option<R> {
             None
         }
 

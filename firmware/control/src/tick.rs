@@ -62,8 +62,9 @@ pub enum Command {
 
 /// Queues into the tick: free of locks on the board, plain queues elsewhere.
 pub trait Inbox {
-    /// Next command; at most one is taken a tick.
-    fn command(&mut self) -> Option<Command>;
+    /// Has `act` carry out the next command where it lies, a copy being half a tick's work, and takes it out; at most one
+    /// a tick.
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R>;
     /// Next point of a streamed reference, 2⁻²⁰ rad or 2⁻²⁰ N·m.
     fn stream_point(&mut self) -> Option<i32>;
 }
@@ -73,7 +74,7 @@ pub trait Inbox {
 pub struct NoInbox;
 
 impl Inbox for NoInbox {
-    fn command(&mut self) -> Option<Command> {
+    fn command<R>(&mut self, _: impl FnOnce(&Command) -> R) -> Option<R> {
         None
     }
 

@@ -98,8 +98,8 @@ fn control_tick(controller: &mut Controller, input: &TickInput, orders: &mut Ord
 struct Orders(Option<Command>);
 
 impl Inbox for Orders {
-    fn command(&mut self) -> Option<Command> {
-        self.0.take()
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        self.0.take().map(|command| act(&command))
     }
 
     fn stream_point(&mut self) -> Option<i32> {

@@ -41,8 +41,8 @@ struct Queues {
 }
 
 impl Inbox for Queues {
-    fn command(&mut self) -> Option<Command> {
-        self.commands.pop_front()
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        self.commands.pop_front().map(|command| act(&command))
     }
 
     fn stream_point(&mut self) -> Option<i32> {
