@@ -1,0 +1,170 @@
+//! The slow side against a tick that only writes down what it is asked for.
+
+use std::collections::VecDeque;
+
+use bowden_control::parameters::Parameters;
+use bowden_control::service::{Identity, Port, Reply, Service, View};
+use bowden_control::tick::Command;
+use bowden_link::message::{Boot, Goal, Mode, Provocation, Refusal};
+use bowden_link::{Fault, FromBoard, PROTOCOL_VERSION, Request, Sample, State, ToBoard};
+
+/// A tick that takes up to four commands and eight points.
+#[derive(Default)]
+struct Tick {
+    view: View,
+    commands: VecDeque<Command>,
+    points: VecDeque<i32>,
+    adopted: usize,
+}
+
+impl Port for Tick {
+    fn command(&mut self, command: Command) -> bool {
+        let room = self.commands.len() < 4;
+        if room {
+            self.commands.push_back(command);
+        }
+        room
+    }
+
+    fn stream_free(&self) -> usize {
+        8 - self.points.len()
+    }
+
+    fn stream(&mut self, point_raw: i32) -> bool {
+        let room = self.stream_free() > 0;
+        if room {
+            self.points.push_back(point_raw);
+        }
+        room
+    }
+
+    fn view(&self) -> View {
+        self.view
+    }
+
+    fn snapshot(&self, _: u8) -> Option<(u32, Sample)> {
+        None
+    }
+
+    fn adopt(&mut self, _: &Parameters) {
+        self.adopted += 1;
+    }
+}
+
+fn service() -> Service {
+    let identity = Identity { firmware: "0.1.0", board: "test", boot: Boot::Power };
+    Service::new(identity, Parameters::default(), "")
+}
+
+fn tick_in(state: State) -> Tick {
+    Tick { view: View { state, ..View::default() }, ..Tick::default() }
+}
+
+fn asked(service: &mut Service, tick: &mut Tick, sequence: u16, message: ToBoard) -> Reply {
+    service.handle(&Request { sequence, message }, 0, tick)
+}
+
+fn refused(refusal: Refusal) -> Reply {
+    Reply::Say(FromBoard::Refused(refusal))
+}
+
+fn index_of(name: &str) -> u16 {
+    Parameters::index_of(name).unwrap()
+}
+
+#[test]
+fn the_greeting_says_who_is_there() {
+    let reply = asked(&mut service(), &mut tick_in(State::Off), 1, ToBoard::Hello);
+    let Reply::Say(FromBoard::Greeting(greeting)) = reply else { panic!("{reply:?}") };
+    assert_eq!((greeting.protocol_version, greeting.parameters), (PROTOCOL_VERSION, 85));
+    assert_eq!((greeting.schema, greeting.board.as_str()), (bowden_link::SCHEMA, "test"));
+}
+
+#[test]
+fn a_failure_is_suffered_only_where_the_parameters_allow_it() {
+    let (mut service, mut tick) = (service(), tick_in(State::Run));
+    let provoke = || ToBoard::Provoke(Provocation::Panic);
+    let allow = index_of("supervisor.allow_provoke");
+    assert_eq!(asked(&mut service, &mut tick, 1, provoke()), refused(Refusal::Forbidden(allow)));
+    asked(&mut service, &mut tick, 2, ToBoard::WriteParameter { index: allow, value: 1.0 });
+    assert_eq!(asked(&mut service, &mut tick, 3, provoke()), Reply::Suffer(Provocation::Panic));
+}
+
+#[test]
+fn flash_is_written_with_the_bridge_off_only() {
+    for state in [State::SelfTest, State::PretensionCheck, State::Ready, State::Homing, State::Run] {
+        let reply = asked(&mut service(), &mut tick_in(state), 1, ToBoard::StoreParameters);
+        assert_eq!(reply, refused(Refusal::WrongState(state)));
+    }
+    for state in [State::Off, State::Fault] {
+        assert_eq!(asked(&mut service(), &mut tick_in(state), 1, ToBoard::StoreParameters), Reply::Store);
+    }
+}
+
+#[test]
+fn a_parameter_changes_only_if_the_tick_takes_it() {
+    let (mut service, mut tick) = (service(), tick_in(State::Off));
+    let index = index_of("limits.speed");
+    let before = service.parameters().get(index);
+    while tick.command(Command::Enter(Goal::Off)) {}
+    let write = || ToBoard::WriteParameter { index, value: 2.5 };
+    assert_eq!(asked(&mut service, &mut tick, 1, write()), refused(Refusal::Busy));
+    assert_eq!((service.parameters().get(index), tick.adopted), (before, 0));
+    tick.commands.clear();
+    assert_eq!(asked(&mut service, &mut tick, 2, write()), Reply::Say(FromBoard::Done));
+    assert_eq!((service.parameters().get(index), tick.adopted), (Some(2.5), 1));
+    assert!(matches!(tick.commands.as_slices().0, [Command::Configure(_)]));
+}
+
+#[test]
+fn what_would_jump_is_not_changed_while_moving() {
+    let (mut service, mut tick) = (service(), tick_in(State::Run));
+    let zero = ToBoard::WriteParameter { index: index_of("encoder.joint.zero"), value: 5.0 };
+    assert_eq!(asked(&mut service, &mut tick, 1, zero), refused(Refusal::Moving));
+    assert_eq!(asked(&mut service, &mut tick, 2, ToBoard::DefaultParameters), refused(Refusal::Moving));
+    assert!(tick.commands.is_empty());
+}
+
+#[test]
+fn a_repeated_request_appends_its_points_once() {
+    let (mut service, mut tick) = (service(), tick_in(State::Run));
+    let points = |values: &[f32]| ToBoard::StreamPoints(values.iter().copied().collect());
+    for sequence in [7, 7, 8] {
+        asked(&mut service, &mut tick, sequence, points(&[0.5, -0.25]));
+    }
+    assert_eq!(tick.points, [1 << 19, -(1 << 18), 1 << 19, -(1 << 18)]);
+    // All or none: five points where four fit.
+    assert_eq!(asked(&mut service, &mut tick, 9, points(&[0.0; 5])), refused(Refusal::StreamFull));
+    assert_eq!(tick.points.len(), 4);
+    assert!(matches!(
+        asked(&mut service, &mut tick, 10, points(&[f32::NAN])),
+        Reply::Say(FromBoard::Refused(Refusal::OutOfRange { .. }))
+    ));
+}
+
+#[test]
+fn a_silent_host_stops_a_joint_that_moves() {
+    let (mut service, mut tick) = (service(), tick_in(State::Run));
+    let limit_ms = (service.parameters().host_timeout_s() * 1e3) as u32;
+    // The clock may wrap between the last word and now.
+    let heard_ms = u32::MAX - 10;
+    service.handle(&Request { sequence: 1, message: ToBoard::Alive }, heard_ms, &mut tick);
+    service.supervise(heard_ms.wrapping_add(limit_ms), &mut tick);
+    assert!(tick.commands.is_empty());
+    tick.view.state = State::Ready;
+    service.supervise(heard_ms.wrapping_add(limit_ms + 1), &mut tick);
+    assert!(tick.commands.is_empty());
+    tick.view.state = State::Run;
+    service.supervise(heard_ms.wrapping_add(limit_ms + 1), &mut tick);
+    assert!(matches!(tick.commands[0], Command::Trip(Fault::HostSilent, 0, silent, limit) if silent > limit));
+}
+
+#[test]
+fn states_that_do_not_follow_are_refused() {
+    let run = ToBoard::Enter(Goal::Run(Mode::Position));
+    let mut tick = tick_in(State::Fault);
+    assert_eq!(asked(&mut service(), &mut tick, 1, run.clone()), refused(Refusal::WrongState(State::Fault)));
+    tick.view.state = State::Ready;
+    assert_eq!(asked(&mut service(), &mut tick, 2, run), Reply::Say(FromBoard::Done));
+    assert_eq!(tick.commands, [Command::Enter(Goal::Run(Mode::Position))]);
+}
