@@ -51,6 +51,8 @@ pub async fn load(store: &mut ParameterStore<BoardFlash>) -> (Parameters, Option
 pub struct Host {
     service: Service,
     store: ParameterStore<BoardFlash>,
+    /// The store holds something that is no set of parameters.
+    unreadable: bool,
     reach: Reach,
     incoming: Accumulator<REQUEST>,
 }
@@ -136,7 +138,7 @@ impl Host {
             let _ = reach.command(Command::Trip(fault, 0, 1.0, 0.0));
         }
         let service = Service::new(identity, parameters, &ended.text);
-        Self { service, store, reach, incoming: Accumulator::default() }
+        Self { service, store, unreadable: unreadable.is_some(), reach, incoming: Accumulator::default() }
     }
 
     async fn take(&mut self, bytes: &[u8]) {
@@ -149,14 +151,22 @@ impl Host {
         }
     }
 
+    /// A store that could not be read holds nothing to lose and is erased first; any other keeps its old set if writing fails.
+    async fn store(&mut self) -> bool {
+        if self.unreadable {
+            self.unreadable = self.store.erase().await.is_err();
+        }
+        self.store.save(self.service.parameters()).await.is_ok()
+    }
+
     async fn answer(&mut self, request: &Request) {
         self.reach.listen();
         let answer = match self.service.handle(request, now_ms(), &mut self.reach) {
             Reply::Say(answer) => answer,
             Reply::Store => {
-                let stored = self.store.save(self.service.parameters()).await;
-                defmt::info!("parameters stored: {=bool}", stored.is_ok());
-                Service::stored(stored.is_ok())
+                let stored = self.store().await;
+                defmt::info!("parameters stored: {=bool}", stored);
+                Service::stored(stored)
             }
             Reply::Suffer(provocation) => {
                 say(request.sequence, FromBoard::Done);
