@@ -35,6 +35,7 @@ pub fn screen(
     candidates: &[Candidate],
     progress: &dyn Progress,
 ) -> Vec<Screened> {
+    let objective = &objective.fitted();
     let basis = Basis::new(&present.jacobian);
     let now = basis.without(&rows(objective, &present.residuals));
     let loss_now = now.norm_squared();

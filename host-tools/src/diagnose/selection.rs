@@ -7,7 +7,7 @@ use super::candidates::candidates;
 use super::screening::screen;
 use crate::fit::free::{Free, recalibrated};
 use crate::fit::objective::{Objective, Part};
-use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
+use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds, solve_with_slopes};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
@@ -33,7 +33,7 @@ const ORDINARY_PRESLIDING_M: f64 = 4e-5;
 const FITTED: usize = 7;
 
 /// Candidates whose fit is brought to an end, of those that fit best so far.
-const FINALISTS: usize = 2;
+const FINALISTS: usize = 3;
 
 /// Estimated gain below which a candidate is not fitted.
 const PROMISING: f64 = 0.05;
@@ -103,7 +103,7 @@ pub fn select(
         for screened in promising {
             let mut with = present.model.clone();
             with.effects.push(screened.start);
-            let solution = fit(objective, &with, own, &[COARSE_STEP])?;
+            let solution = fit_new(objective, &with, own, &present)?;
             fits.push((objective.mean_loss(&solution.residuals, Part::HeldOut), solution));
             progress.advance(1);
         }
@@ -196,11 +196,26 @@ fn prune(
     Ok(())
 }
 
+/// Like [`fit`], for a model that is that of `present` with one more effect, and only as far as a ranking needs.
+fn fit_new(
+    objective: &Objective,
+    model: &JointModel,
+    own: usize,
+    present: &Solution,
+) -> Result<Solution, Failure> {
+    let free = free_parameters(model, own);
+    solve_with_slopes(objective, model, &free, PATIENCE, &[COARSE_STEP], Some(&present.jacobian))
+}
+
 /// Fits the nominal parameters and those of all effects beyond the first `own`, which the rig itself stated.
 fn fit(objective: &Objective, model: &JointModel, own: usize, rounds: &[f64]) -> Result<Solution, Failure> {
+    solve_in_rounds(objective, model, &free_parameters(model, own), PATIENCE, rounds)
+}
+
+fn free_parameters(model: &JointModel, own: usize) -> Vec<Free> {
     let mut free = recalibrated(model);
     for effect in own..model.effects.len() {
         free.extend(Free::of_effect(model, effect));
     }
-    solve_in_rounds(objective, model, &free, PATIENCE, rounds)
+    free
 }

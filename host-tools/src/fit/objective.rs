@@ -10,6 +10,8 @@
 //! measured value is zero. A residual beyond three scales enters with its root only (soft L1), so that a few violent
 //! moments do not decide.
 
+use std::sync::Arc;
+
 use bowden_model::channel::Channel;
 
 use crate::joint_model::JointModel;
@@ -113,7 +115,7 @@ pub struct Block {
 /// Recordings, prepared for comparison.
 #[derive(Clone, Debug)]
 pub struct Objective {
-    datasets: Vec<Dataset>,
+    datasets: Vec<Arc<Dataset>>,
     scales: Vec<(Series, f64)>,
     noise_variances: Vec<(Series, f64)>,
     free_offsets: Vec<Channel>,
@@ -168,14 +170,23 @@ impl Objective {
             .iter()
             .map(|(series, noise)| (*series, scale_of(model, *series, *noise, &datasets)))
             .collect();
+        let datasets = datasets.into_iter().map(Arc::new).collect();
         Ok(Self { datasets, scales, noise_variances, free_offsets: model.free_offsets.clone() })
+    }
+
+    /// The recordings of which anything is fitted to; they come first, so their residuals are the first ones of all.
+    #[must_use]
+    pub fn fitted(&self) -> Self {
+        let fitted = |dataset: &Dataset| dataset.blocks.iter().any(|block| block.part == Part::Training);
+        let count = self.datasets.iter().take_while(|dataset| fitted(dataset)).count();
+        Self { datasets: self.datasets[..count].to_vec(), ..self.clone() }
     }
 
     /// The same recordings with every sample used for fitting.
     #[must_use]
     pub fn all_training(&self) -> Self {
         let mut all = self.clone();
-        for block in all.datasets.iter_mut().flat_map(|dataset| &mut dataset.blocks) {
+        for block in all.datasets.iter_mut().flat_map(|dataset| &mut Arc::make_mut(dataset).blocks) {
             block.part = Part::Training;
         }
         all

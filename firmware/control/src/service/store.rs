@@ -26,7 +26,7 @@ const BUFFER: usize = RECORD + 64;
 pub enum StoreError {
     /// The flash failed or is full of what cannot be repaired.
     Flash,
-    /// The record belongs to another layout of parameters, or a value is out of range.
+    /// The record belongs to another layout of parameters, a value is out of range, or what is there is no record.
     Unusable,
 }
 
@@ -53,7 +53,10 @@ impl<F: NorFlash> ParameterStore<F> {
         let mut buffer = [0; BUFFER];
         let record: Option<&[u8]> =
             self.map.fetch_item(&mut buffer, &KEY).await.map_err(|_| StoreError::Flash)?;
-        let Some(record) = record else { return Ok(None) };
+        let Some(record) = record else {
+            // Flash that was never written is all ones; anything else once was, or was to be, a set of parameters.
+            return if self.is_blank().await? { Ok(None) } else { Err(StoreError::Unusable) };
+        };
         let (layout, values) = record.split_first_chunk::<4>().ok_or(StoreError::Unusable)?;
         if u32::from_le_bytes(*layout) != layout_hash() || record.len() != RECORD {
             return Err(StoreError::Unusable);
@@ -64,6 +67,19 @@ impl<F: NorFlash> ParameterStore<F> {
         }
         parameters.validate().map_err(|_| StoreError::Unusable)?;
         Ok(Some(parameters))
+    }
+
+    async fn is_blank(&mut self) -> Result<bool, StoreError> {
+        const STEP: usize = 64;
+        let range = self.map.flash_range();
+        let mut bytes = [0; STEP];
+        for offset in range.step_by(STEP) {
+            self.map.flash().read(offset, &mut bytes).await.map_err(|_| StoreError::Flash)?;
+            if bytes.iter().any(|byte| *byte != 0xff) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Stores `parameters`. A power cut at any moment leaves the set before or this one.
