@@ -8,6 +8,7 @@
 //! 5. The named physics is fitted once more to all data and written as a rig file.
 
 mod candidates;
+mod experiment;
 mod place;
 mod screening;
 mod selection;
@@ -28,7 +29,9 @@ use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::rig::{Rig, RigDocument};
 use crate::simulation::Prediction;
-use selection::{Chosen, Selected, select};
+pub use experiment::Experiment;
+use experiment::Shown;
+use selection::{Chosen, Selected, Tried, select};
 use verdict::{
     ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, Recalibrated, SCHEMA, Trace, Verdict,
 };
@@ -53,6 +56,8 @@ pub struct Diagnosed {
     /// Nominal parameters that fit: section, name, value.
     parameters: Vec<(&'static str, &'static str, f64)>,
     effects: Vec<ActiveEffect>,
+    /// Motions that would part the named effects from those that could not be excluded.
+    pub experiments: Vec<Experiment>,
     /// Time that the fitted recordings took.
     clock_s: f64,
 }
@@ -172,12 +177,20 @@ impl Case<'_> {
             .collect();
         let own = model.effects.len();
         let mut first_value = nominal.len();
+        let shown = Shown::by(&training.iter().chain(heldout).collect::<Vec<_>>());
+        let mut experiments = Vec::new();
         let mut effects = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
             let active = last.model.effects[own + index];
             let count = active.descriptor().parameters.len();
             let values = first_value..first_value + count;
-            effects.push(named(active, chosen, &last.stds[values], objective));
+            let separate = |tried: &Tried| {
+                let found = experiment::separating(rig, chosen, tried, &shown)?;
+                let words = found.in_words();
+                experiments.push(found);
+                Some(words)
+            };
+            effects.push(named(active, chosen, &last.stds[values], objective, separate));
             first_value += count;
         }
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -253,16 +266,23 @@ impl Case<'_> {
                 regimes: place::regimes(objective, stages),
             },
             parameters,
+            experiments,
             effects: last.model.effects[own..].to_vec(),
             clock_s: objective.duration_s(),
         }
     }
 }
 
-fn named(active: ActiveEffect, chosen: &Chosen, stds: &[Option<f64>], objective: &Objective) -> NamedEffect {
+fn named(
+    active: ActiveEffect,
+    chosen: &Chosen,
+    stds: &[Option<f64>],
+    objective: &Objective,
+    separate: impl FnMut(&Tried) -> Option<String>,
+) -> NamedEffect {
     let descriptor = active.descriptor();
     let improvement = 1.0 - chosen.loss_after / chosen.loss_before;
-    let (probability, rivals) = words::rivals(chosen, improvement);
+    let (probability, rivals) = words::rivals(chosen, improvement, separate);
     let parameters = descriptor
         .parameters
         .iter()

@@ -409,12 +409,20 @@ impl Board {
         if !machine.bus.rig.inject(injection, on, now_s) {
             match injection {
                 Injection::BridgeFault => machine.bus.set_bridge_fault(on, now),
+                Injection::EncoderBus(at) => {
+                    machine.bus.stalled_encoders[usize::from(at == EncoderAt::Joint)] = on;
+                }
                 Injection::HostSilent => machine.bus.host.silent = on,
                 Injection::HostNotReading => machine.bus.host.withheld = on,
                 _ => {}
             }
         }
         machine.refresh();
+    }
+
+    /// Holds the core as a debugger does, or lets it go on; timers, converters, DMA and watchdog run meanwhile.
+    pub fn halt_core(&mut self, halt: bool) {
+        self.cpu.machine_mut().halted = halt;
     }
 
     /// Lets faults of the core reach the firmware's handlers instead of ending the run: undefined instructions, accesses

@@ -79,6 +79,8 @@ pub(crate) struct Bus {
     /// What happened so far.
     pub trace: Trace,
     bridge_fault: bool,
+    /// Encoders whose SPI asks DMA for nothing.
+    pub stalled_encoders: [bool; 2],
     /// Cycle by which a fast clock must have boost mode.
     boost_deadline: u64,
     /// A reset that a peripheral asks for.
@@ -118,6 +120,7 @@ impl Bus {
             rig,
             trace: Trace::new(),
             bridge_fault: false,
+            stalled_encoders: [false; 2],
             boost_deadline: NEVER,
             reset_request: None,
             failure: None,
@@ -130,6 +133,7 @@ impl Bus {
 
     /// Resets all peripherals at `now`; flash content and what is outside the part stay.
     pub(crate) fn reset(&mut self, cause: ResetCause, now: u64) {
+        let now_s = self.seconds(now);
         self.trace.event(now, Kind::Reset, &[]);
         self.rcc.reset(cause);
         self.clock.set_hz(now, HSI_HZ);
@@ -157,6 +161,10 @@ impl Bus {
         self.flash.reset();
         self.watchdog = Watchdog::new();
         self.reset_request = None;
+        for encoder in self.rig.encoders.iter_mut().filter(|encoder| encoder.selected()) {
+            // A reset lets go of chip select at any moment: a cut frame, no misuse of the part.
+            let _ = encoder.deselect(now_s);
+        }
         self.pins_changed(now);
         self.bridge_changed(now);
     }
@@ -334,10 +342,10 @@ impl Bus {
         }
         for (index, [receive, transmit]) in REQUEST_SPI.iter().enumerate() {
             if request == *receive {
-                return self.spi[index].receive_request();
+                return self.spi[index].receive_request() && !self.stalled_encoders[index];
             }
             if request == *transmit {
-                return self.spi[index].transmit_request();
+                return self.spi[index].transmit_request() && !self.stalled_encoders[index];
             }
         }
         false

@@ -202,6 +202,10 @@ impl Cpu {
             if machine.bus.seconds(cycle) >= self.next_log_s {
                 self.drain_log();
             }
+            if self.machine().halted {
+                self.idle_until(limit);
+                continue;
+            }
             if let Some((exception, priority)) = self.uc.get_data().scs.candidate() {
                 let it = sleep == Sleep::Awake && exceptions::inside_it_block(&self.uc)?;
                 if !it && exceptions::unmasked(&self.uc, priority)? {
@@ -212,14 +216,19 @@ impl Cpu {
                 }
             }
             if sleep != Sleep::Awake && !self.wake()? {
-                let machine = self.uc.get_data_mut();
-                let until = machine.next_event.min(limit).max(machine.cycle + 1);
-                machine.idle += until - machine.cycle;
-                machine.cycle = until;
+                self.idle_until(limit);
                 continue;
             }
             self.start(limit)?;
         }
+    }
+
+    /// Lets time pass up to the next event, at most to `limit`.
+    fn idle_until(&mut self, limit: u64) {
+        let machine = self.uc.get_data_mut();
+        let until = machine.next_event.min(limit).max(machine.cycle + 1);
+        machine.idle += until - machine.cycle;
+        machine.cycle = until;
     }
 
     /// Ends the sleep if there is a reason to.

@@ -54,6 +54,8 @@ pub(crate) struct EncoderFault {
     pub bit_error: f64,
     /// Largest error of the count, uniform.
     pub noise_counts: u32,
+    /// The last bit of each frame is wrong.
+    pub last_bit: bool,
     /// Nothing drives the line: it reads ones.
     pub silent: bool,
     /// AS5045: magnet out of range (status bits), field lost.
@@ -150,6 +152,12 @@ impl Encoder {
                     self.shift ^= 1 << bit;
                 }
             }
+        }
+        if self.fault.last_bit {
+            self.shift ^= match self.mounting.part {
+                EncoderPart::Amt22 => 1 << 16,
+                EncoderPart::As5045 => 1 << 14,
+            };
         }
         if self.fault.silent {
             self.shift = u32::MAX;
@@ -295,6 +303,9 @@ mod tests {
         encoder.fault = EncoderFault { silent: true, ..EncoderFault::default() };
         encoder.select(0.0, 0.0);
         assert_eq!(encoder.exchange(8, 3.0e-6, 9.0e-6, MODE0), Ok(0xff));
+        encoder.fault = EncoderFault { last_bit: true, ..EncoderFault::default() };
+        encoder.select(0.0, 0.0);
+        assert_eq!(encoder.shift >> 16, u32::from(amt22_frame(0)) ^ 1);
         encoder.fault = EncoderFault { bit_error: 0.5, ..EncoderFault::default() };
         encoder.select(0.0, 0.0);
         assert_ne!(encoder.shift >> 16, u32::from(amt22_frame(0)));

@@ -67,8 +67,13 @@ pub enum Injection {
     EncoderNoise(EncoderAt, u32),
     /// Each bit of an encoder's frame is wrong with this probability \[1\].
     EncoderBitErrors(EncoderAt, f64),
+    /// The last bit of each frame of an encoder is wrong: the parity of an AS5045, a bit of an AMT22 that is 0 in the 12-bit
+    /// type.
+    EncoderLastBit(EncoderAt),
     /// An encoder's line is open.
     EncoderSilent(EncoderAt),
+    /// The SPI of an encoder asks DMA for nothing: a transfer does not begin, or does not end.
+    EncoderBus(EncoderAt),
     /// The magnet of an AS5045 is lost: its status bits say so.
     EncoderMagnetLost(EncoderAt),
     /// The bridge pulls its fault pin low.

@@ -91,6 +91,8 @@ pub(crate) struct Machine {
     pub event: bool,
     /// What the core waits for.
     pub sleep: Sleep,
+    /// A debugger holds the core; everything else goes on.
+    pub halted: bool,
     /// Why the simulator stopped.
     pub trap: Option<Trap>,
     /// Faults of the core go to the firmware.
@@ -130,6 +132,7 @@ impl Machine {
             look: false,
             event: false,
             sleep: Sleep::Awake,
+            halted: false,
             trap: None,
             deliver_faults: false,
             processor_fault: None,

@@ -190,6 +190,7 @@ impl Rig {
             Injection::EncoderBitErrors(at, probability) => {
                 self.encoders[encoder_index(at)].fault.bit_error = if on { probability } else { 0.0 };
             }
+            Injection::EncoderLastBit(at) => self.encoders[encoder_index(at)].fault.last_bit = on,
             Injection::EncoderSilent(at) => self.encoders[encoder_index(at)].fault.silent = on,
             Injection::EncoderMagnetLost(at) => self.encoders[encoder_index(at)].fault.magnet_lost = on,
             Injection::Pretension(cable, ratio) => {
@@ -197,7 +198,10 @@ impl Rig {
                 self.pretension[index] = if on { ratio } else { 1.0 };
                 self.bench.set_pretension_ratio(self.pretension);
             }
-            Injection::BridgeFault | Injection::HostSilent | Injection::HostNotReading => return false,
+            Injection::EncoderBus(_)
+            | Injection::BridgeFault
+            | Injection::HostSilent
+            | Injection::HostNotReading => return false,
         }
         true
     }

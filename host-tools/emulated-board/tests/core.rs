@@ -163,6 +163,22 @@ const COUNTED: &[u16] = &[
 ];
 
 #[test]
+fn a_halted_core_stands_while_time_goes_on() {
+    let mut board = board(COUNTED, &[(15, 0x2a)], &[]);
+    board.run_for(1e-3).expect("runs");
+    let before = board.counters();
+    board.halt_core(true);
+    board.run_for(1e-3).expect("time passes");
+    let halted = board.counters();
+    assert_eq!((halted.instructions, halted.exceptions), (before.instructions, before.exceptions));
+    assert_eq!(halted.idle_cycles - before.idle_cycles, halted.cycles - before.cycles);
+    board.halt_core(false);
+    board.run_for(1e-3).expect("runs");
+    // One SysTick for all that passed meanwhile, and 15 or 16 of its own.
+    assert!((16..=17).contains(&(board.counters().exceptions - before.exceptions)), "{:?}", board.counters());
+}
+
+#[test]
 fn a_function_costs_the_same_whether_an_interrupt_preempts_it_or_not() {
     let mut board = board(COUNTED, &[(15, 0x2a)], &[("work", 0x1c, 14), ("tick", 0x2a, 4)]);
     board.measure_symbol("work").expect("in the symbol table");

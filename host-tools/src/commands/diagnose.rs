@@ -24,7 +24,8 @@ pub struct DiagnoseArguments {
     /// Rig file: what the bench is believed to be
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// Folder for diagnosis.json, report.html and rig.diagnosed.toml; made if it is not there
+    /// Folder for diagnosis.json, report.html rig.diagnosed.toml and the references of
+    /// experiments worth doing; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Recordings that judge the diagnosis and take no other part; without them a part of the others is held out
@@ -87,6 +88,9 @@ impl DiagnoseArguments {
         output::write_file(&page, |file| file.write_all(report::render(&diagnosed.findings).as_bytes()))?;
         diagnosed.write_into(&mut task.document)?;
         task.document.save(&rig)?;
+        for experiment in &diagnosed.experiments {
+            experiment.reference.save(&task.out.join(&experiment.file))?;
+        }
         print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
         Ok(outcome_of(task.training.iter().chain(&task.heldout)))
     }

@@ -49,6 +49,8 @@ const PATIENCE: usize = 5;
 pub struct Tried {
     /// The effect as it was fitted.
     pub effect: ActiveEffect,
+    /// Model with it.
+    pub model: JointModel,
     /// Held-out loss with it.
     pub heldout_loss: f64,
 }
@@ -58,6 +60,8 @@ pub struct Tried {
 pub struct Chosen {
     /// The effect, with its target, as it was first fitted.
     pub effect: ActiveEffect,
+    /// Model with it, as it was first fitted.
+    pub model: JointModel,
     /// Held-out loss before it was added.
     pub loss_before: f64,
     /// Held-out loss with it.
@@ -126,9 +130,14 @@ pub fn select(
         let effect = newest(&solution);
         let others = fits
             .iter()
-            .map(|(heldout_loss, solution)| Tried { effect: newest(solution), heldout_loss: *heldout_loss })
+            .map(|(heldout_loss, solution)| Tried {
+                effect: newest(solution),
+                model: solution.model.clone(),
+                heldout_loss: *heldout_loss,
+            })
             .collect();
-        chosen.push(Chosen { effect, loss_before, loss_after, others });
+        let model = solution.model.clone();
+        chosen.push(Chosen { effect, model, loss_before, loss_after, others });
         present = solution;
     }
     prune(objective, own, &mut present, &mut chosen, progress)?;

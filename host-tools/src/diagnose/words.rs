@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use bowden_model::effect::{ActiveEffect, Component};
 
-use super::selection::Chosen;
+use super::selection::{Chosen, Tried};
 use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
 
 /// Sharpness with which a ratio of held-out losses turns into odds: a candidate that leaves a fifth more is six times
@@ -17,28 +17,34 @@ const EVEN_IMPROVEMENT: f64 = 0.1;
 /// Odds below which a rival is not listed.
 const LISTED_ODDS: f64 = 0.03;
 
-/// Probability of the chosen effect, and what it could be instead.
-pub(super) fn rivals(chosen: &Chosen, improvement: f64) -> (f64, Vec<Rival>) {
+/// Probability of the chosen effect, and what it could be instead. `separate` finds the experiment that parts the two;
+/// where it finds none, a general one is named.
+pub(super) fn rivals(
+    chosen: &Chosen,
+    improvement: f64,
+    mut separate: impl FnMut(&Tried) -> Option<String>,
+) -> (f64, Vec<Rival>) {
     let own_id = chosen.effect.descriptor().id;
-    let odds: Vec<(&str, f64, Component)> = chosen
+    let odds: Vec<(&Tried, f64)> = chosen
         .others
         .iter()
         .filter(|tried| tried.effect.descriptor().id != own_id)
         .map(|tried| {
             let ratio = tried.heldout_loss / chosen.loss_after;
-            let descriptor = tried.effect.descriptor();
-            (descriptor.id, ratio.powf(-ODDS_PER_LOSS_RATIO), descriptor.component)
+            (tried, ratio.powf(-ODDS_PER_LOSS_RATIO))
         })
         .collect();
-    let sum: f64 = 1.0 + odds.iter().map(|(_, odds, _)| odds).sum::<f64>();
+    let sum: f64 = 1.0 + odds.iter().map(|(_, odds)| odds).sum::<f64>();
     let present = 1.0 - 0.5 * (-(improvement - EVEN_IMPROVEMENT).max(0.0) / EVEN_IMPROVEMENT).exp();
     let mut rivals: Vec<Rival> = Vec::new();
-    for (id, odds, component) in odds {
-        if odds > LISTED_ODDS && rivals.iter().all(|rival| rival.id != id) {
+    for (tried, odds) in odds {
+        let descriptor = tried.effect.descriptor();
+        if odds > LISTED_ODDS && rivals.iter().all(|rival| rival.id != descriptor.id) {
+            let general = || experiment(descriptor.id, descriptor.component).to_owned();
             rivals.push(Rival {
-                id: id.to_owned(),
+                id: descriptor.id.to_owned(),
                 probability: present * odds / sum,
-                separating_experiment: experiment(id, component).to_owned(),
+                separating_experiment: separate(tried).unwrap_or_else(general),
             });
         }
     }

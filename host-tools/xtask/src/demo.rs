@@ -26,13 +26,13 @@ pub fn run() -> Result<(), String> {
     process::run(&mut cargo(&build), &[0])?;
 
     println!("2/3 recording 60 s of a simulated bench that conceals something ({})", folder.display());
-    let mut record = Command::new(built("virtual-bench")?);
+    let mut record = Command::new(built("release", "virtual-bench")?);
     record.args(["record", "--effect", CONCEALED, "--seed", SEED, "--out"]).arg(&folder);
     process::run(&mut record, &[0])?;
 
     println!("3/3 diagnosing: the rig file and the recordings are all that bowden sees");
     let out = folder.join("diagnosis");
-    let mut diagnose = Command::new(built("bowden")?);
+    let mut diagnose = Command::new(built("release", "bowden")?);
     diagnose.current_dir(&folder).args([
         "diagnose",
         "train.csv",

@@ -1,15 +1,29 @@
-//! `cargo xtask`: demonstration, tests and benchmarks of the workspace, one command each.
+//! `cargo xtask`: demonstration, images, lints, tests and benchmarks of the workspace, one command each.
 #![forbid(unsafe_code)]
 
 mod bench;
+mod clippy;
+mod core_from_source;
+mod cross_target;
+mod debian;
 mod demo;
+mod files;
+mod firmware;
+mod image_size;
+mod memory_map;
+mod parts;
 mod process;
+mod prove;
+mod system_packages;
+mod tally;
 mod test;
 
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
+
+use crate::parts::Parts;
 
 /// What is done with this workspace
 #[derive(Debug, Parser)]
@@ -23,17 +37,26 @@ struct Cli {
 enum Task {
     /// Record a simulated bench that conceals a fault and let `bowden diagnose` find it
     Demo,
-    /// Run all tests
-    Test,
-    /// Run all benchmarks: speed of model and bench, and what the motion reconstruction gains
-    Bench,
+    /// Run all tests, those of the board's images on the emulated board among them
+    Test(Parts),
+    /// Run all benchmarks: speed of model and bench, gain of the motion reconstruction, cost on the board
+    Bench(Parts),
+    /// Hide effects in simulated rigs and count how often `bowden diagnose` finds them; `prove --help` lists options
+    Prove(prove::Options),
+    /// Build the release images for the driver board and print what they take of its memory
+    Firmware,
+    /// Run clippy on everything, the board's images among it; warnings are errors
+    Clippy,
 }
 
 fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(Cli { task: Task::Demo }) => demo::run(),
-        Ok(Cli { task: Task::Test }) => test::run(),
-        Ok(Cli { task: Task::Bench }) => bench::run(),
+        Ok(Cli { task: Task::Test(parts) }) => test::run(parts),
+        Ok(Cli { task: Task::Bench(parts) }) => bench::run(parts),
+        Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
+        Ok(Cli { task: Task::Firmware }) => firmware::run(),
+        Ok(Cli { task: Task::Clippy }) => clippy::run(),
         Err(error) => return usage(&error),
     };
     match done {
@@ -61,7 +84,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         .collect();
     let what = what.join(" ");
     eprintln!(
-        "xtask: {}; the tasks are demo, test and bench, see `cargo xtask --help`",
+        "xtask: {}; the tasks are demo, test, bench, prove, firmware and clippy, see `cargo xtask --help`",
         what.strip_prefix("error: ").unwrap_or(&what)
     );
     ExitCode::from(2)

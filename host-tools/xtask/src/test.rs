@@ -1,24 +1,106 @@
-//! `cargo xtask test`: all tests that need neither hardware nor another toolchain.
+//! `cargo xtask test`: all tests that need no hardware, those of the board's release images among them.
 
-use crate::process::{self, cargo, shared};
+use std::fmt;
+use std::time::{Duration, Instant};
 
-/// Runs the unit tests of the firmware's library and the tests of all other members, whose closing lines come last.
+use crate::parts::Parts;
+use crate::process::{self, EMULATED_BOARD, built, cargo, shared};
+use crate::tally::Tally;
+use crate::{cross_target, firmware, system_packages};
+
+/// Runs the tests; the closing lines say what has run and how it went. A part that fails does not stop the other.
 ///
 /// # Errors
-/// When a test fails.
-pub fn run() -> Result<(), String> {
+/// When a test fails, or a part cannot be run.
+pub fn run(parts: Parts) -> Result<(), String> {
+    let mut outcomes = Vec::new();
+    let mut command_is_built = false;
+    if parts.host() {
+        let outcome = timed("host", host);
+        // Its own tests build it, with other features of its dependencies: to build it alone takes a minute more.
+        command_is_built = outcome.result.is_ok();
+        outcomes.push(outcome);
+    }
+    if parts.board() {
+        outcomes.push(timed("board", || board(command_is_built)));
+    }
+    println!();
+    for outcome in &outcomes {
+        println!("{outcome}");
+    }
+    let failed: Vec<_> =
+        outcomes.iter().filter(|outcome| outcome.result.is_err()).map(|outcome| outcome.part).collect();
+    if failed.is_empty() { Ok(()) } else { Err(format!("tests failed: {}", failed.join(", "))) }
+}
+
+/// How a part went.
+struct Outcome {
+    part: &'static str,
+    result: Result<String, String>,
+    took: Duration,
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let seconds = self.took.as_secs();
+        let (what, text) = match &self.result {
+            Ok(done) => ("", done),
+            Err(reason) => ("FAILED: ", reason),
+        };
+        write!(f, "{:<6} {what}{text} ({} min {:02} s)", self.part, seconds / 60, seconds % 60)
+    }
+}
+
+fn timed(part: &'static str, run: impl FnOnce() -> Result<String, String>) -> Outcome {
+    println!("\n== tests: {part}");
+    let started = Instant::now();
+    let result = run();
+    Outcome { part, result, took: started.elapsed() }
+}
+
+/// Tests of everything that is built for the host, but for the emulated board.
+fn host() -> Result<String, String> {
     let data = shared().join("data");
-    let mut rest = cargo(&["test"]);
+    let mut tests = cargo(&["test", "--no-fail-fast"]);
     if data.is_dir() {
         println!("real recordings: {}", data.display());
     } else {
         // Passed tests are silent otherwise, and a skipped one passes.
-        rest.args(["--", "--show-output"]);
+        tests.args(["--", "--show-output"]);
         println!(
             "real recordings: none, {} is not there; each test that misses one prints a line `skipped: ...`",
             data.display()
         );
     }
-    process::run(&mut cargo(&["test", "--package", "bowden-firmware", "--lib"]), &[0])?;
-    process::run(&mut rest, &[0])
+    Tally::of(&mut tests).map(|tally| tally.to_string())
+}
+
+/// Tests of the release images, which are built first, as is the command that talks to the board.
+fn board(command_is_built: bool) -> Result<String, String> {
+    system_packages::ensure()?;
+    cross_target::ensure()?;
+    let images = firmware::build()?;
+    if !command_is_built {
+        process::run(&mut cargo(&["build", "--package", "bowden"]), &[0])?;
+    }
+    let mut tests = cargo(&["test", "--no-fail-fast"]);
+    tests.args(EMULATED_BOARD);
+    firmware::announce(&images, &mut tests);
+    tests.env("BOWDEN_BIN", built("debug", "bowden")?);
+    Tally::of(&mut tests).map(|tally| tally.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_closing_line_tells_part_outcome_and_time() {
+        let result = Ok("3 tests passed".to_owned());
+        let outcome = Outcome { part: "host", result, took: Duration::from_secs(125) };
+        assert_eq!(outcome.to_string(), "host   3 tests passed (2 min 05 s)");
+        let result = Err("no image".to_owned());
+        let outcome = Outcome { part: "board", result, took: Duration::from_millis(900) };
+        assert_eq!(outcome.to_string(), "board  FAILED: no image (0 min 00 s)");
+    }
 }

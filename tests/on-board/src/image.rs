@@ -24,7 +24,9 @@ pub fn target_folder() -> Outcome<PathBuf> {
     // target/<profile>/deps/<test>, or target/<profile>/<binary>
     let folder = program.ancestors().skip(1).find(|folder| !folder.ends_with("deps"));
     let target = folder.and_then(|profile| profile.parent());
-    target.map(PathBuf::from).ok_or_else(|| Failure(format!("{}: no target folder above it", program.display())))
+    target
+        .map(PathBuf::from)
+        .ok_or_else(|| Failure(format!("{}: no target folder above it", program.display())))
 }
 
 fn read(variable: &str, name: &str) -> Outcome<Vec<u8>> {

@@ -2,14 +2,19 @@
 //!
 //! Everything here fails with a [`Failure`] that says in words what was met; a test passes it on and adds what it expected.
 #![forbid(unsafe_code)]
-#![allow(clippy::missing_errors_doc, reason = "all of it fails with the board, its link or the image, in words")]
+#![allow(
+    clippy::missing_errors_doc,
+    reason = "all of it fails with the board, its link or the image, in words"
+)]
 
 pub mod cost;
 pub mod course;
 pub mod host;
 pub mod image;
+pub mod load;
 pub mod telemetry;
 pub mod ticks;
+pub mod tool;
 
 use std::fmt;
 

@@ -63,7 +63,10 @@ mod tests {
         for (first, length) in [(1000, 24), (1024, 7), (1040, 2)] {
             telemetry.push(&batch(first, length));
         }
-        assert_eq!((telemetry.missing, telemetry.disordered, telemetry.received, telemetry.lost), (9, 0, 33, 3));
+        assert_eq!(
+            (telemetry.missing, telemetry.disordered, telemetry.received, telemetry.lost),
+            (9, 0, 33, 3)
+        );
         let ticks: Vec<u32> = telemetry.take().iter().map(|(tick, _)| *tick).collect();
         assert_eq!((ticks[0], ticks[31], ticks[32]), (1000, 1040, 1041));
         telemetry.push(&batch(1000, 1));

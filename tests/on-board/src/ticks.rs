@@ -50,6 +50,8 @@ pub struct Ticks {
     /// Beginnings of the last ticks \[s\], the newest last.
     beginnings_s: VecDeque<f64>,
     last_rise: Option<Edge>,
+    /// Cycles of the longest tick since boot.
+    pub longest: u64,
     /// Cycles from one beginning to the next, since [`Self::measure_anew`].
     pub period: Range,
     /// Cycles from a beginning to its end, since [`Self::measure_anew`].
@@ -63,6 +65,7 @@ impl Default for Ticks {
             begun: 0,
             beginnings_s: VecDeque::new(),
             last_rise: None,
+            longest: 0,
             period: Range::NOTHING,
             busy: Range::NOTHING,
         }
@@ -70,12 +73,13 @@ impl Default for Ticks {
 }
 
 impl Ticks {
-    /// Takes in what the marker did since the last call. A reset between two calls hides the ticks between the last call and
-    /// it.
+    /// Takes in what the marker did since the last call; nothing of it if there was a reset since then.
     pub fn follow(&mut self, board: &mut Board) {
         let boots = board.counters().boots;
         if boots != self.boots {
             *self = Self { boots, ..Self::default() };
+            // Those of the run before; the first tick of this one comes milliseconds behind the reset.
+            board.take_edges(TICK_MARKER);
         }
         for edge in board.take_edges(TICK_MARKER) {
             match (edge.high, self.last_rise) {
@@ -90,7 +94,11 @@ impl Ticks {
                         self.beginnings_s.pop_front();
                     }
                 }
-                (false, Some(rise)) => self.busy.add(edge.cycle - rise.cycle),
+                (false, Some(rise)) => {
+                    let cycles = edge.cycle - rise.cycle;
+                    self.busy.add(cycles);
+                    self.longest = self.longest.max(cycles);
+                }
                 (false, None) => {}
             }
         }

@@ -1,8 +1,18 @@
 //! The release images on the emulated board.
 
 mod boot;
+mod bridge;
 mod closed_loop;
 mod conformance;
+mod coverage;
+mod determinism;
+mod failures;
+mod faults;
+mod load;
+mod parameters;
+mod stop;
+mod terminal;
+mod usb;
 
 use bowden_board::Board;
 use bowden_link::message::{Reference, Shape};

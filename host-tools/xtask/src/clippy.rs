@@ -1,0 +1,21 @@
+//! `cargo xtask clippy`: lints of the whole workspace, warnings as errors.
+
+use crate::process::{self, EMULATED_BOARD, cargo};
+use crate::{cross_target, firmware, system_packages};
+
+/// Checks what runs on a host, then the images for the board.
+///
+/// # Errors
+/// When there is a warning, or something that is needed for building is missing.
+pub fn run() -> Result<(), String> {
+    system_packages::ensure()?;
+    cross_target::ensure()?;
+    // The same selections as for the tests: with another one cargo would choose other features of the dependencies, and
+    // compile the emulator once more.
+    for selected in [&[] as &[&str], &EMULATED_BOARD] {
+        let mut clippy = cargo(&["clippy", "--all-targets"]);
+        clippy.args(selected).args(["--", "-D", "warnings"]);
+        process::run(&mut clippy, &[0])?;
+    }
+    firmware::clippy()
+}

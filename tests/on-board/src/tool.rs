@@ -1,0 +1,87 @@
+//! The host tool `bowden`, run against the pseudo terminal of an emulated board.
+
+use std::env;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use bowden_board::{Board, Terminal};
+
+use crate::image::target_folder;
+use crate::{Failure, Outcome, fail};
+
+/// Board time between two looks at the tool \[s\].
+const LOOK_S: f64 = 5e-3;
+/// Board time after which a tool has to be done \[s\].
+const LIMIT_S: f64 = 120.0;
+
+/// What a run of the tool gave.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ran {
+    /// Exit status.
+    pub status: Option<i32>,
+    /// Standard output.
+    pub output: String,
+    /// Standard error.
+    pub errors: String,
+}
+
+/// The tool: the file that `BOWDEN_BIN` names, or the newest build.
+pub fn tool() -> Outcome<PathBuf> {
+    if let Some(path) = env::var_os("BOWDEN_BIN") {
+        return Ok(PathBuf::from(path));
+    }
+    let folder = target_folder()?;
+    let builds = ["release", "debug"].map(|profile| folder.join(profile).join("bowden"));
+    let newest = builds
+        .into_iter()
+        .filter_map(|path| Some((path.metadata().ok()?.modified().ok()?, path)))
+        .max()
+        .map(|(_, path)| path);
+    newest.ok_or_else(|| Failure(format!("{}: no tool; build it: cargo build -p bowden", folder.display())))
+}
+
+/// A board whose port is a pseudo terminal.
+pub struct Plugged {
+    /// The board.
+    pub board: Board,
+    terminal: Terminal,
+}
+
+impl Plugged {
+    /// Plugs `board` in and lets it be enumerated.
+    pub fn new(mut board: Board) -> Outcome<Self> {
+        let terminal = Terminal::open(None)?;
+        board.run_until("USB port", |board| board.usb_ready(), 1.0)?;
+        Ok(Self { board, terminal })
+    }
+
+    /// Runs `bowden <command> --port <terminal> <arguments>` while the board runs, not faster than real time.
+    pub fn run(&mut self, command: &str, arguments: &[&str]) -> Outcome<Ran> {
+        let path = tool()?;
+        let what = format!("{} {command} {}", path.display(), arguments.join(" "));
+        let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
+        let child = Command::new(&path)
+            .arg(command)
+            .arg("--port")
+            .arg(self.terminal.path())
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(failed)?;
+        // Another thread reads what it prints, so that it never waits for us.
+        let waiting = std::thread::spawn(move || child.wait_with_output());
+        let end_s = self.board.time_s() + LIMIT_S;
+        while !waiting.is_finished() {
+            if self.board.time_s() > end_s {
+                return fail(format!("{what}: not done within {LIMIT_S} s of board time"));
+            }
+            self.terminal.serve(&mut self.board, LOOK_S, true, |_| {})?;
+        }
+        let output = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
+        let output = output.map_err(failed)?;
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        Ok(Ran { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) })
+    }
+}

@@ -1,0 +1,45 @@
+//! Every fault of the protocol is provoked by a test: whoever adds a fault has to name its test here.
+
+use bowden_link::Fault;
+
+/// Sources of the tests that provoke faults.
+const SOURCES: [&str; 3] =
+    [include_str!("faults.rs"), include_str!("failures.rs"), include_str!("parameters.rs")];
+
+/// The test that provokes `fault`.
+fn test_of(fault: Fault) -> &'static str {
+    match fault {
+        Fault::EncoderCheck => "an_open_encoder_line_fails_its_check",
+        Fault::EncoderParity => "a_wrong_bit_of_an_as5045_fails_its_parity",
+        Fault::EncoderStatus => "a_lost_magnet_of_an_as5045_says_so",
+        Fault::EncoderMissing => "an_encoder_bus_that_stands_is_a_missing_encoder",
+        Fault::EncoderStuck => "an_encoder_that_stands_is_found",
+        Fault::EncoderJump => "a_loose_magnet_is_a_jump",
+        Fault::TensionRail => "a_broken_tension_wire_is_at_a_rail",
+        Fault::Slack | Fault::OverTension => "slack_and_overload_are_found",
+        Fault::TensionInconsistent => "tensions_that_do_not_fit_the_friction_are_found",
+        Fault::OverCurrent => "over_current_stops_in_three_ticks",
+        Fault::BusUnderVoltage | Fault::BusOverVoltage => "a_bus_voltage_out_of_range_stops",
+        Fault::BridgeFault => "a_fault_of_the_bridge_stops_at_once",
+        Fault::TickOverrun => "a_late_tick_is_a_fault",
+        Fault::HostSilent => "a_host_that_falls_silent_stops_the_joint",
+        Fault::ParameterStoreCorrupt => "a_broken_store_is_told_and_defaults_are_used",
+        Fault::Watchdog => "a_hang_ends_with_the_watchdog_and_the_motor_is_off_long_before",
+        Fault::Panic => "a_panic_stops_the_motor_and_leaves_its_words",
+        Fault::HardFault => "a_processor_fault_stops_the_motor_and_says_where",
+        Fault::SelfTestTimeout => "a_restless_sensor_ends_the_self_test",
+        Fault::PretensionOff => "lost_pretension_is_found_before_the_bridge_is_on",
+        Fault::HomingTimeout => "homing_that_does_not_arrive_ends",
+    }
+}
+
+#[test]
+fn every_fault_is_provoked() {
+    for fault in Fault::ALL {
+        let test = format!("#[test]\nfn {}() -> Outcome {{", test_of(*fault));
+        let source = SOURCES.iter().find(|source| source.contains(&test));
+        let body = source.and_then(|source| source.split(&test).nth(1)).unwrap_or_default();
+        let body = body.split("\n}\n").next().unwrap_or_default();
+        assert!(body.contains(&format!("Fault::{fault:?}")), "{fault:?} is not in {}", test_of(*fault));
+    }
+}

@@ -1,0 +1,118 @@
+//! Failures of the firmware itself, provoked by the host: panic, processor fault, hang, late tick.
+
+use bowden_board::ResetCause;
+use bowden_link::message::{Boot, Goal, Provocation, Refusal};
+use bowden_link::{Fault, FromBoard, State, ToBoard};
+use bowden_on_board_tests::host::Host;
+use bowden_on_board_tests::{Outcome, fail};
+
+use crate::stop::{PERIOD_S, moving, stopped, until_open};
+use crate::switched_on;
+
+/// A moving joint whose board may be provoked.
+fn provocable() -> Outcome<Host> {
+    let mut host = moving()?;
+    host.set("supervisor.allow_provoke", 1.0)?;
+    host.board.deliver_faults(true);
+    Ok(host)
+}
+
+#[test]
+fn nobody_provokes_a_board_by_mistake() -> Outcome {
+    let mut host = switched_on(1)?;
+    for provocation in
+        [Provocation::Panic, Provocation::ProcessorFault, Provocation::Hang, Provocation::LateTick]
+    {
+        let answer = host.ask(&ToBoard::Provoke(provocation))?;
+        let index = Host::index("supervisor.allow_provoke")?;
+        assert_eq!(answer, FromBoard::Refused(Refusal::Forbidden(index)));
+    }
+    host.run(0.3)?;
+    assert_eq!((host.board.counters().boots, host.status()?.fault), (1, None));
+    Ok(())
+}
+
+#[test]
+fn a_late_tick_is_a_fault() -> Outcome {
+    let mut host = provocable()?;
+    host.order(&ToBoard::Provoke(Provocation::LateTick))?;
+    let (record, _) = stopped(&mut host, 0.02)?;
+    assert_eq!(record.fault, Fault::TickOverrun, "{record}");
+    // More than a period on purpose.
+    assert!((1.2..5.0).contains(&record.got) && record.limit == 1.0, "{record}");
+    assert_eq!(host.board.counters().boots, 1);
+    Ok(())
+}
+
+/// Provokes a failure that ends the run; the bridge is open within a tick of it, and the board comes back with `fault`.
+///
+/// Returns the text that it kept.
+fn end_of_run(provocation: Provocation, boot: Boot, fault: Fault) -> Outcome<String> {
+    let mut host = provocable()?;
+    host.order(&ToBoard::Provoke(provocation))?;
+    let opening = until_open(&mut host, 0.05)?;
+    let greeting = host.await_reset(1, 0.3)?;
+    assert_eq!(greeting.boot, boot);
+    let status = host.status()?;
+    let Some(record) = status.fault else { return fail(format!("no fault behind the reset: {status:?}")) };
+    assert_eq!((status.state, record.fault), (State::Fault, fault), "{record}");
+    println!("{record}");
+    // The last 64 ticks of the run before are there, the joint moving in them; behind the last one that drove, the bridge
+    // was open within a tick.
+    let snapshot = host.snapshot()?;
+    assert_eq!(snapshot.len(), 64);
+    assert!(snapshot.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1));
+    let driving = snapshot.iter().filter(|(_, sample)| sample.state == State::Run).map(|(tick, _)| *tick);
+    let last = driving.max().expect("ticks that drove");
+    assert!(last + 1 >= opening.ticks.saturating_sub(1) && last <= opening.ticks, "{last}, {opening:?}");
+    assert!(opening.after_s < 0.05, "{opening:?}");
+    let text = host.panic_text()?;
+    println!("{text}");
+    // It is kept until it is cleared.
+    assert!(host.order(&ToBoard::Enter(Goal::Ready)).is_err());
+    assert_eq!(host.board.pwm().duty, None);
+    host.order(&ToBoard::Enter(Goal::ClearFault))?;
+    host.reach(State::Off, 0.01)?;
+    host.make_ready()?;
+    // Power-on forgets.
+    host.reset(ResetCause::PowerOn)?;
+    assert_eq!((host.status()?.fault, host.status()?.snapshot < 64), (None, false));
+    assert_eq!(host.panic_text()?, "");
+    Ok(text)
+}
+
+#[test]
+fn a_panic_stops_the_motor_and_leaves_its_words() -> Outcome {
+    let text = end_of_run(Provocation::Panic, Boot::Software, Fault::Panic)?;
+    assert!(text.contains("provoked") && text.contains(".rs:"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_processor_fault_stops_the_motor_and_says_where() -> Outcome {
+    let text = end_of_run(Provocation::ProcessorFault, Boot::Software, Fault::HardFault)?;
+    // UNDEFINSTR of CFSR.
+    assert!(text.contains("0x08") && text.contains("0x00010000"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_hang_ends_with_the_watchdog_and_the_motor_is_off_long_before() -> Outcome {
+    let text = end_of_run(Provocation::Hang, Boot::Watchdog, Fault::Watchdog)?;
+    assert_eq!(text, "");
+    Ok(())
+}
+
+#[test]
+fn the_watchdog_bites_in_time() -> Outcome {
+    let mut host = provocable()?;
+    host.order(&ToBoard::Provoke(Provocation::Hang))?;
+    let opening = until_open(&mut host, 0.05)?;
+    // The encoders stand with all the rest: 5 ms for the answer, four ticks without a frame and what is under way.
+    assert!(opening.after_s < 5e-3 + 7.0 * PERIOD_S, "{opening:?}");
+    let hung_s = host.board.time_s();
+    host.await_reset(1, 0.3)?;
+    // 150 ms behind the last sign of life.
+    assert!(host.board.time_s() - hung_s < 0.2, "{} s", host.board.time_s() - hung_s);
+    Ok(())
+}

@@ -1,0 +1,207 @@
+//! Every fault of sensors, supply and motion, provoked at the pins of the running board.
+
+use bowden_board::{Board, Cable, EncoderAt, EncoderMounting, EncoderPart, Injection, Rail, TensionAt};
+use bowden_link::message::{Goal, Reference};
+use bowden_link::{Fault, FaultRecord, State, ToBoard};
+use bowden_on_board_tests::host::Host;
+use bowden_on_board_tests::{Outcome, image};
+
+use crate::stop::{LIVELY, checked, moving, stop_by, stopped, until_open};
+use crate::{ready, switched_on};
+
+/// Stops the moving joint by `injection` within `limit_s`; fault and channel are as expected.
+fn injected(injection: Injection, fault: Fault, channel: u8, limit_s: f64) -> Outcome<FaultRecord> {
+    let mut host = moving()?;
+    let (record, opening) = stop_by(&mut host, injection, 2.0 * limit_s)?;
+    assert_eq!((record.fault, record.channel), (fault, channel), "{record}");
+    assert!(opening.after_s <= limit_s, "{record}: {opening:?}");
+    Ok(record)
+}
+
+/// Four bad frames in a row, read a tick ahead: six ticks at most, one of them to begin with.
+const FRAMES_S: f64 = 0.7e-3;
+
+#[test]
+fn an_open_encoder_line_fails_its_check() -> Outcome {
+    injected(Injection::EncoderSilent(EncoderAt::Input), Fault::EncoderCheck, 0, FRAMES_S)?;
+    injected(Injection::EncoderSilent(EncoderAt::Joint), Fault::EncoderCheck, 1, FRAMES_S).map(|_| ())
+}
+
+#[test]
+fn a_frame_of_another_type_of_encoder_does_not_pass() -> Outcome {
+    // The AMT22 has no parity of its own: the wrong bit breaks its check.
+    injected(Injection::EncoderLastBit(EncoderAt::Joint), Fault::EncoderCheck, 1, FRAMES_S).map(|_| ())
+}
+
+#[test]
+fn an_encoder_bus_that_stands_is_a_missing_encoder() -> Outcome {
+    injected(Injection::EncoderBus(EncoderAt::Input), Fault::EncoderMissing, 0, FRAMES_S).map(|_| ())
+}
+
+#[test]
+fn a_loose_magnet_is_a_jump() -> Outcome {
+    injected(Injection::EncoderJump(EncoderAt::Input, 300), Fault::EncoderJump, 0, FRAMES_S).map(|_| ())
+}
+
+#[test]
+fn an_encoder_that_stands_is_found() -> Outcome {
+    // 0.15 rad at about 0.9 rad/s, and 20 ms.
+    injected(Injection::EncoderStuck(EncoderAt::Joint), Fault::EncoderStuck, 1, 0.35).map(|_| ())
+}
+
+/// A board with two AS5045, told so over the link, and its joint moving.
+fn moving_with_as5045() -> Outcome<Host> {
+    let mounting =
+        |count_at_zero| EncoderMounting { part: EncoderPart::As5045, count_at_zero, reversed: false };
+    let elf = image::firmware()?;
+    let board = Board::builder(&elf)
+        .encoder(EncoderAt::Input, mounting(1000))
+        .encoder(EncoderAt::Joint, mounting(2000));
+    // The parameters are stored by a board whose encoders are not read: a part is not to be clocked in the other's mode.
+    let mut first = switched_on(1)?;
+    first.board.inject(Injection::EncoderBus(EncoderAt::Input));
+    first.board.inject(Injection::EncoderBus(EncoderAt::Joint));
+    first.set("encoder.input.part", 1.0)?;
+    first.set("encoder.joint.part", 1.0)?;
+    first.order(&ToBoard::StoreParameters)?;
+    let mut host = Host::connect(board.flash_image(first.board.flash_image()).build()?)?;
+    host.make_ready()?;
+    host.follow(LIVELY)?;
+    host.run(1.0)?;
+    Ok(host)
+}
+
+#[test]
+fn a_wrong_bit_of_an_as5045_fails_its_parity() -> Outcome {
+    let mut host = moving_with_as5045()?;
+    let bit = Injection::EncoderLastBit(EncoderAt::Input);
+    let (record, opening) = stop_by(&mut host, bit, 0.01)?;
+    assert_eq!((record.fault, record.channel), (Fault::EncoderParity, 0), "{record}");
+    assert!(opening.after_s <= FRAMES_S, "{opening:?}");
+    Ok(())
+}
+
+#[test]
+fn a_lost_magnet_of_an_as5045_says_so() -> Outcome {
+    let mut host = moving_with_as5045()?;
+    let lost = Injection::EncoderMagnetLost(EncoderAt::Joint);
+    let (record, opening) = stop_by(&mut host, lost, 0.01)?;
+    assert_eq!((record.fault, record.channel), (Fault::EncoderStatus, 1), "{record}");
+    assert!(opening.after_s <= FRAMES_S, "{opening:?}");
+    Ok(())
+}
+
+/// 1 ms, and a tick at either end.
+const TENSION_S: f64 = 1.2e-3;
+
+#[test]
+fn a_broken_tension_wire_is_at_a_rail() -> Outcome {
+    let low = injected(Injection::TensionWire(TensionAt::F2, Rail::Low), Fault::TensionRail, 1, TENSION_S)?;
+    assert!((low.got - 0.02).abs() < 2e-3 && (low.limit - 0.1).abs() < 2e-3, "{low}");
+    let high = injected(Injection::TensionWire(TensionAt::F3, Rail::High), Fault::TensionRail, 2, TENSION_S)?;
+    assert!((high.got - 3.28).abs() < 2e-3 && (high.limit - 3.2).abs() < 2e-3, "{high}");
+    Ok(())
+}
+
+#[test]
+fn slack_and_overload_are_found() -> Outcome {
+    let slack = injected(Injection::TensionOffset(TensionAt::F4, -34.0), Fault::Slack, 3, TENSION_S)?;
+    assert!(slack.got < 1.0 && slack.limit == 1.0, "{slack}");
+    let mut host = moving()?;
+    // The reading becomes 100 N.
+    let offset_n = 100.0 - host.board.bench().tensions_n()[0];
+    let overload = Injection::TensionOffset(TensionAt::F1, offset_n);
+    let (over, opening) = stop_by(&mut host, overload, 0.01)?;
+    assert_eq!((over.fault, over.channel), (Fault::OverTension, 0), "{over}");
+    assert!((over.got - 100.0).abs() < 2.0 && over.limit == 90.0, "{over}");
+    assert!(opening.after_s <= TENSION_S, "{opening:?}");
+    Ok(())
+}
+
+#[test]
+fn tensions_that_do_not_fit_the_friction_are_found() -> Outcome {
+    // 50 ms, and the low-pass of 5 ms.
+    injected(Injection::TensionOffset(TensionAt::F1, 45.0), Fault::TensionInconsistent, 0, 0.075).map(|_| ())
+}
+
+#[test]
+fn over_current_stops_in_three_ticks() -> Outcome {
+    let record = injected(Injection::CurrentOffset(9.5), Fault::OverCurrent, 0, 0.4e-3)?;
+    assert!(record.got > 8.0 && record.limit == 8.0, "{record}");
+    Ok(())
+}
+
+#[test]
+fn a_bus_voltage_out_of_range_stops() -> Outcome {
+    // 5 ms of debounce.
+    let low = injected(Injection::BusVoltage(15.0), Fault::BusUnderVoltage, 0, 5.3e-3)?;
+    assert!((low.got - 15.0).abs() < 0.1 && low.limit == 18.0, "{low}");
+    let high = injected(Injection::BusVoltage(32.0), Fault::BusOverVoltage, 0, 5.3e-3)?;
+    assert!((high.got - 32.0).abs() < 0.1 && high.limit == 30.0, "{high}");
+    Ok(())
+}
+
+#[test]
+fn a_fault_of_the_bridge_stops_at_once() -> Outcome {
+    injected(Injection::BridgeFault, Fault::BridgeFault, 0, 40e-6).map(|_| ())
+}
+
+#[test]
+fn a_host_that_falls_silent_stops_the_joint() -> Outcome {
+    let mut host = moving()?;
+    host.keeps_alive = false;
+    let silent_s = host.board.time_s();
+    host.board.inject(Injection::HostSilent);
+    let opening = until_open(&mut host, 1.0)?;
+    // Half a second of silence, looked for every 5 ms; the last word was at most 0.1 s ago.
+    assert!((0.4..0.51).contains(&(opening.at_s - silent_s)), "{opening:?}");
+    host.board.clear_all();
+    let record = host.await_fault(0.2)?;
+    assert_eq!(record.fault, Fault::HostSilent, "{record}");
+    let behind_s = opening.at_s - host.ticks.beginning_s(record.tick).expect("a tick of this run");
+    assert!((0.0..=1e-4).contains(&behind_s), "{behind_s} s");
+    checked(&mut host, record)
+}
+
+#[test]
+fn a_restless_sensor_ends_the_self_test() -> Outcome {
+    let mut host = switched_on(1)?;
+    host.board.inject(Injection::CurrentOffset(0.8));
+    host.order(&ToBoard::Enter(Goal::Ready))?;
+    let record = host.await_fault(2.5)?;
+    assert_eq!((record.fault, record.channel), (Fault::SelfTestTimeout, 6), "{record}");
+    assert_eq!(record.limit, 2.0);
+    checked(&mut host, record)
+}
+
+#[test]
+fn lost_pretension_is_found_before_the_bridge_is_on() -> Outcome {
+    let mut host = switched_on(1)?;
+    host.board.inject(Injection::Pretension(Cable::A, 0.4));
+    host.run(0.2)?;
+    host.order(&ToBoard::Enter(Goal::Ready))?;
+    let record = host.await_fault(2.5)?;
+    assert_eq!(record.fault, Fault::PretensionOff, "{record}");
+    // Mean of the four ends: twice 0.4 of 30 N and twice 30 N; 6 N less than 30 N are allowed.
+    assert!((record.got - 21.0).abs() < 0.3 && record.limit == 24.0 && record.channel < 2, "{record}");
+    assert_eq!(host.board.pwm().duty, None);
+    checked(&mut host, record)
+}
+
+#[test]
+fn homing_that_does_not_arrive_ends() -> Outcome {
+    let mut host = ready(1)?;
+    host.set("supervisor.homing_timeout", 0.2)?;
+    host.follow(Reference::Hold(0.5))?;
+    host.run(1.5)?;
+    host.order(&ToBoard::Enter(Goal::Off))?;
+    host.run(0.3)?;
+    // Friction holds the arm where it is, about.
+    assert!(host.board.bench().theta_out_rad() > 0.2, "{} rad", host.board.bench().theta_out_rad());
+    host.make_ready()?;
+    host.order(&ToBoard::Enter(Goal::Home))?;
+    host.reach(State::Homing, 0.01)?;
+    let (record, _) = stopped(&mut host, 0.5)?;
+    assert_eq!(record.fault, Fault::HomingTimeout, "{record}");
+    Ok(())
+}

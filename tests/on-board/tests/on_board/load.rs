@@ -1,0 +1,63 @@
+//! Tick, memory and link at full load.
+
+use bowden_board::Board;
+use bowden_link::message::Goal;
+use bowden_link::{State, ToBoard};
+use bowden_on_board_tests::Outcome;
+use bowden_on_board_tests::load::under_load;
+
+use crate::ready;
+use crate::stop::LIVELY;
+
+/// Goals: beginning of the tick steady to 1.5 us; at most 3000 instructions and 20 % of 17 000 cycles; compensator at most
+/// 400 instructions.
+#[test]
+fn the_tick_keeps_its_time_at_full_load() -> Outcome {
+    let mut host = ready(1)?;
+    let load = under_load(&mut host, 2.0)?;
+    println!("{load:?}");
+    // 1.5 us of 170 MHz.
+    assert!(load.period.spread() <= 255, "{load:?}");
+    assert!((load.period.mean() - 17_000.0).abs() < 1.0, "{load:?}");
+    assert!(load.tick.typical_instructions <= 3000.0 && load.busy.max <= 3400, "{load:?}");
+    assert!(load.compensator.worst_instructions <= 400, "{load:?}");
+    assert!(load.samples[0] >= 19_900 && load.samples[1] == 0, "{load:?}");
+    assert!(load.requests >= 500, "{load:?}");
+    let status = host.status()?;
+    assert_eq!((status.state, status.lost, status.bad_frames), (State::Run, 0, 0));
+    // What the firmware says of its own tick is what its marker shows, less entry and exit.
+    let told = u64::from(status.longest_tick_cycles);
+    assert!(told.abs_diff(host.ticks.longest) <= 100, "{status:?}, longest {}", host.ticks.longest);
+    // A tick that takes a new configuration is longer, and short enough for 20 kHz.
+    assert!(told <= 8500, "{status:?}");
+    // Half of the stack is room for what the emulation does not see.
+    assert!(2 * load.memory.stack_used_bytes <= load.memory.stack_bytes, "{load:?}");
+    // The image leaves half of the flash, and all of the parameter store.
+    assert!(load.memory.image.flash_bytes <= Board::flash_bytes() / 2, "{load:?}");
+    Ok(())
+}
+
+/// The highest control rate: 8500 cycles a tick.
+#[test]
+fn the_joint_runs_at_twenty_kilohertz() -> Outcome {
+    let mut host = ready(1)?;
+    host.order(&ToBoard::Enter(Goal::Off))?;
+    host.set("control.rate_divider", 1.0)?;
+    host.make_ready()?;
+    host.order(&ToBoard::Telemetry(true))?;
+    host.follow(LIVELY)?;
+    host.run(0.1)?;
+    host.ticks.measure_anew();
+    let (begun, received) = (host.ticks.begun, host.telemetry.received);
+    host.run(1.0)?;
+    let status = host.status()?;
+    println!("{:?} {:?} {status:?}", host.ticks.period, host.ticks.busy);
+    assert_eq!((status.state, status.period_ns), (State::Run, 50_000));
+    assert!(host.ticks.begun - begun >= 20_000 && (host.ticks.period.mean() - 8500.0).abs() < 1.0);
+    assert!(host.ticks.busy.max <= 4250, "half of the period: {:?}", host.ticks.busy);
+    assert!(host.ticks.period.spread() <= 255, "{:?}", host.ticks.period);
+    // Nothing is lost on the link, or it is counted.
+    assert_eq!(host.telemetry.missing, u64::from(host.telemetry.lost));
+    assert!(host.telemetry.received - received >= 19_900, "{:?}", host.telemetry.lost);
+    Ok(())
+}
