@@ -1,6 +1,7 @@
 //! What the tests across crates share: recordings of the virtual bench as bowden reads them, and where real ones lie.
 #![forbid(unsafe_code)]
 
+pub mod prove;
 pub mod recovery;
 
 use std::path::PathBuf;

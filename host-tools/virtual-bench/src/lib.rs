@@ -46,7 +46,7 @@
 //! tendon loop is compiled twice, with and without the look at node effects. A steep Stribeck curve makes the rope
 //! stick and slip at slow strokes, as real ropes do; the mean friction then lies below the curve. Effects with an onset
 //! (lost pretension, changed payload, disturbed sheath) draw it between 8 and 30 s: a shorter recording does not show
-//! it. Three effects are outside the catalogue of diagnoses ([`ConcealedEffect::is_outside_catalogue`]); a tool should
+//! it. Five effects are outside the catalogue of diagnoses ([`ConcealedEffect::is_outside_catalogue`]); a tool should
 //! abstain there.
 //!
 //! # Use

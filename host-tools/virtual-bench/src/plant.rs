@@ -321,6 +321,9 @@ impl Plant {
         if let Some(law) = &effects.joint_magnetic_detent {
             torque += law.torque_nm(arm.angle_rad);
         }
+        if let Some(law) = &effects.joint_torque_ripple {
+            torque += law.torque_nm(arm.angle_rad);
+        }
         self.arm.advance(torque, inertia, dt);
     }
 

@@ -28,6 +28,8 @@ pub(crate) struct Sensors {
     effects: ActiveEffects,
     lag: Option<Lag>,
     noise: Draw,
+    period_s: f64,
+    samples: u64,
     rad_per_count: f64,
     newton_per_lsb: f64,
     full_scale_n: f64,
@@ -53,6 +55,8 @@ impl Sensors {
             effects,
             lag,
             noise: Draw::new(seed, "sensor noise"),
+            period_s,
+            samples: 0,
             rad_per_count: TAU / f64::from(1_u32 << config.encoder_bits),
             newton_per_lsb: config.tension_full_scale_n / f64::from(1_u32 << config.adc_bits),
             full_scale_n: config.tension_full_scale_n,
@@ -94,6 +98,10 @@ impl Sensors {
         if let Some(law) = &self.effects.sensor_offset {
             sample[law.channel as usize] += law.offset;
         }
+        if let Some(law) = &self.effects.sensor_hum {
+            sample[law.channel as usize] += law.pick_up_n(self.samples as f64 * self.period_s);
+        }
+        self.samples += 1;
         for channel in [Channel::ThetaIn, Channel::ThetaOut] {
             let value = &mut sample[channel as usize];
             *value = (*value / self.rad_per_count).round() * self.rad_per_count;

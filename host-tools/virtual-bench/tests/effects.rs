@@ -3,6 +3,8 @@
 //! Runs with and without an effect share motion and noise. Tolerances cover encoder steps of 1.5 mrad, 0.1 N of noise
 //! averaged over some thousand samples, and the controller's different path; each is a few per cent of the mark.
 
+use std::f64::consts::TAU;
+
 use virtual_bench::*;
 
 fn bench() -> BenchConfig {
@@ -570,7 +572,16 @@ fn physics_outside_the_catalogue_is_marked_and_leaves_its_own_trace() {
         .copied()
         .filter(|id| ConcealedEffect::drawn(id, 1.0, 1).is_ok_and(|effect| effect.is_outside_catalogue()))
         .collect();
-    assert_eq!(outside, ["sheath_kink_spot", "torque_constant_swing", "joint_magnetic_detent"]);
+    assert_eq!(
+        outside,
+        [
+            "sheath_kink_spot",
+            "torque_constant_swing",
+            "joint_magnetic_detent",
+            "joint_torque_ripple",
+            "sensor_hum"
+        ]
+    );
 
     let reference = strokes();
     let base = plain(&bench(), &reference);
@@ -601,6 +612,28 @@ fn physics_outside_the_catalogue_is_marked_and_leaves_its_own_trace() {
     let side = 0.06 / 3.0_f64.sqrt();
     close(at(0.25 + side), 0.15, 0.1, "leaving the latch");
     close(at(0.25 - side), -0.15, 0.1, "drawn into the latch");
+
+    let ripple = JointTorqueRipple { peak_nm: 0.12, cycles_per_turn: 20.0, phase_rad: 0.0 };
+    let with = run(&bench(), ripple, &reference);
+    let at = |turns: f64| {
+        mean_where(
+            base.len(),
+            |k| up(k) && (with.theta_out_rad[k] - turns * TAU).abs() < 0.008,
+            |k| extra_joint_nm(&with, &base, k),
+        )
+    };
+    // A torque that drives the arm takes as much from the tendons: peaks at a quarter and three quarters of a period.
+    close(at(0.0125), -0.12, 0.1, "ripple that drives");
+    close(at(0.0375), 0.12, 0.1, "ripple that brakes");
+    close(at(-0.0375), -0.12, 0.1, "the same angle one period earlier");
+
+    let hum = SensorHum { channel: Channel::F3, amplitude_n: 2.0, frequency_hz: 10.0, phase_rad: 0.0 };
+    let with = run(&bench(), hum, &reference);
+    // Noise does not depend on effects: the difference is the wave itself, to a step of the converter.
+    let difference = |k: usize| with.f3_n[k] - base.f3_n[k];
+    assert!((difference(1_025) - 2.0).abs() < 0.03 && (difference(1_075) + 2.0).abs() < 0.03);
+    assert!(difference(1_050).abs() < 0.03, "half a period");
+    assert_eq!(with.f1_n, base.f1_n);
 
     let swing = TorqueConstantSwing { amplitude: 0.2, period_s: 4.0, phase_rad: 0.0 };
     let reference = path(&[(0.6, 2.0), (0.6, 8.0)]);

@@ -219,4 +219,6 @@ effects! {
     sheath_kink_spot: KinkSpot,
     torque_constant_swing: TorqueConstantSwing,
     joint_magnetic_detent: JointMagneticDetent,
+    joint_torque_ripple: JointTorqueRipple,
+    sensor_hum: SensorHum,
 }

@@ -1,0 +1,13 @@
+//! The concealed-effects benchmark: rigs of the virtual bench, drawn by seed, diagnosed from their files alone.
+//!
+//! A [`plan`] says which rigs; [`run`] draws one, writes its files and lets the binary work on them; the [`outcome`] is
+//! kept as a line of JSON; [`score`] and [`summary`] judge it against the [`truth`], and [`page`] prints that.
+
+pub mod outcome;
+pub mod page;
+pub mod plan;
+pub mod run;
+pub mod score;
+pub mod summary;
+pub mod tool;
+pub mod truth;
