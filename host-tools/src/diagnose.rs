@@ -113,7 +113,12 @@ pub fn diagnose(
         ..model.clone()
     };
     let selected = select(&objective, &search, progress)?;
-    let last = refine(&objective, &model, &selected, progress)?;
+    let last = if selected.complete {
+        refine(&objective, &model, &selected, progress)?
+    } else {
+        let model = at_full_resolution(&selected.solution.model, &model);
+        Solution { model, ..selected.solution.clone() }
+    };
     let before = objective.predict(&model)?;
     let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
     let after = objective.predict(&last.model)?;
@@ -182,7 +187,7 @@ impl Case<'_> {
         let mut effects = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
             let active = last.model.effects[own + index];
-            let count = active.descriptor().parameters.len();
+            let count = active.descriptor().parameters.iter().filter(|spec| spec.searched).count();
             let values = first_value..first_value + count;
             let separate = |tried: &Tried| {
                 let found = experiment::separating(rig, chosen, tried, &shown)?;
@@ -223,16 +228,13 @@ impl Case<'_> {
             })
             .collect();
         let loss_after = objective.mean_loss(&left, Part::HeldOut);
+        let summary =
+            words::summary(verdict, &effects, &recalibrated_parameters, loss_recalibrated, loss_after);
         let diagnosis = Diagnosis {
             schema: SCHEMA.to_owned(),
             verdict,
-            summary: words::summary(
-                verdict,
-                &effects,
-                &recalibrated_parameters,
-                loss_recalibrated,
-                loss_after,
-            ),
+            summary: if selected.complete { summary } else { format!("{summary} {}", words::STOPPED) },
+            complete: selected.complete,
             effects,
             recalibrated: recalibrated_parameters,
             indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model)
@@ -287,6 +289,7 @@ fn named(
         .parameters
         .iter()
         .zip(active.parameters)
+        .filter(|(spec, _)| spec.searched)
         .zip(stds)
         .map(|((spec, value), std)| {
             let at_bound = value <= spec.lower || value >= spec.upper;

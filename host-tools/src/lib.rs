@@ -5,6 +5,7 @@ pub mod cli;
 pub mod commands;
 pub mod diagnose;
 pub mod fit;
+pub mod interrupt;
 pub mod joint_model;
 pub mod link;
 pub mod marks;

@@ -9,13 +9,11 @@
 //! | [`session`] | from off to a running reference and back to off |
 //! | [`course`] | what the joint is to follow |
 //! | [`conversion`], [`recorder`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
-//! | [`interrupt`] | Ctrl-C |
 
 pub mod client;
 pub mod conversion;
 pub mod course;
 pub mod error;
-pub mod interrupt;
 pub mod losses;
 pub mod parameters;
 pub mod recorder;

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::interrupt;
+
 /// Receives the progress of long work; may be called from several threads.
 pub trait Progress: Sync {
     /// A stage begins that consists of so many steps; 0 if the number is not known.
@@ -13,6 +15,11 @@ pub trait Progress: Sync {
 
     /// So many steps of the stage are done.
     fn advance(&self, steps: u64);
+
+    /// Whether the user wants the work to end with what there is.
+    fn interrupted(&self) -> bool {
+        false
+    }
 }
 
 /// The progress display for this process: a bar on a terminal, else now and then a line, nothing when `quiet`.
@@ -28,6 +35,23 @@ pub fn for_stderr(quiet: bool) -> Box<dyn Progress> {
 
 /// Time between two lines where there is no terminal: short commands leave a log empty, long ones show life.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Another display, for work that Ctrl-C ends early; to be used after [`interrupt::catch`].
+pub struct UntilInterrupted<'a>(pub &'a dyn Progress);
+
+impl Progress for UntilInterrupted<'_> {
+    fn stage(&self, name: &str, steps: u64) {
+        self.0.stage(name, steps);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.advance(steps);
+    }
+
+    fn interrupted(&self) -> bool {
+        interrupt::requested()
+    }
+}
 
 /// Shows nothing.
 #[derive(Clone, Copy, Debug)]

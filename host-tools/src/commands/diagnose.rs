@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use super::{all_paths, load_recordings, outcome_of, print};
 use crate::diagnose::diagnose;
+use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
-use crate::progress::Progress;
+use crate::progress::{Progress, UntilInterrupted};
 use crate::recording::Recording;
 use crate::report;
 use crate::rig::{Rig, RigDocument};
@@ -79,7 +80,9 @@ impl DiagnoseArguments {
     /// # Errors
     /// What makes an input unusable, or the reason why no result can be written.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
+        interrupt::catch()?;
         let mut task = self.prepare()?;
+        let progress = &UntilInterrupted(progress);
         let diagnosed = diagnose(&task.rig, &task.training, &task.heldout, progress)?;
         let [result, page, rig] = FILES.map(|name| task.out.join(name));
         let json = serde_json::to_string_pretty(&diagnosed.findings.diagnosis)
@@ -92,6 +95,12 @@ impl DiagnoseArguments {
             experiment.reference.save(&task.out.join(&experiment.file))?;
         }
         print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
-        Ok(outcome_of(task.training.iter().chain(&task.heldout)))
+        let mut outcome = outcome_of(task.training.iter().chain(&task.heldout));
+        if !diagnosed.findings.diagnosis.complete {
+            outcome.extend([
+                "stopped early: not every effect was tried; run it again to the end before trusting it",
+            ]);
+        }
+        Ok(outcome)
     }
 }

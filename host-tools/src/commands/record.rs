@@ -4,12 +4,13 @@ use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use crate::interrupt;
 use crate::link::conversion::{Conversion, columns};
 use crate::link::course::{Course, CourseArguments, run_seconds};
 use crate::link::recorder::{Recorder, Tally};
 use crate::link::rig_file::{self, Weight};
 use crate::link::session::{RunEnd, Session};
-use crate::link::{LinkError, ParameterSet, PortArguments, interrupt};
+use crate::link::{LinkError, ParameterSet, PortArguments};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::Progress;

@@ -5,10 +5,11 @@ use std::ops::ControlFlow;
 use bowden_link::Limit;
 
 use super::print;
+use crate::interrupt;
 use crate::link::course::{CourseArguments, run_seconds};
 use crate::link::recorder::tick_time_s;
 use crate::link::session::{RunEnd, RunTick, Session};
-use crate::link::{LinkError, PortArguments, interrupt};
+use crate::link::{LinkError, PortArguments};
 use crate::outcome::{Failure, Outcome};
 
 /// Arguments of `bowden send`.

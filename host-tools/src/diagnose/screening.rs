@@ -47,7 +47,11 @@ pub fn screen(
     let judged: Vec<(usize, Option<Screened>)> = starts
         .par_iter()
         .map(|(candidate, start)| {
-            let screened = judge(objective, &present.model, *start, &basis, &now, loss_now);
+            let screened = if progress.interrupted() {
+                None
+            } else {
+                judge(objective, &present.model, *start, &basis, &now, loss_now)
+            };
             progress.advance(1);
             (*candidate, screened)
         })

@@ -79,6 +79,8 @@ pub struct Selected {
     pub solution: Solution,
     /// Chosen effects in the order of the model's new effects.
     pub chosen: Vec<Chosen>,
+    /// Whether the search came to its end.
+    pub complete: bool,
 }
 
 /// Finds the effects that improve the held-out data.
@@ -95,7 +97,7 @@ pub fn select(
     let baseline = fit(objective, model, own, &[COARSE_STEP, FINE_STEP, FINE_STEP])?;
     let mut present = baseline.clone();
     let mut chosen: Vec<Chosen> = Vec::new();
-    while chosen.len() < MOST_EFFECTS {
+    while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
         let loss_before = objective.mean_loss(&present.residuals, Part::HeldOut);
         let predictions = objective.predict(&present.model)?;
         let all = candidates(&present.model, objective, &predictions);
@@ -105,6 +107,9 @@ pub fn select(
         progress.stage("fitting effects", promising.len() as u64);
         let mut fits: Vec<(f64, Solution)> = Vec::new();
         for screened in promising {
+            if progress.interrupted() {
+                break;
+            }
             let mut with = present.model.clone();
             with.effects.push(screened.start);
             let solution = fit_new(objective, &with, own, &present)?;
@@ -114,6 +119,9 @@ pub fn select(
         fits.retain(|(_, solution)| !solution.model.effects.last().is_some_and(negligible));
         fits.sort_by(|a, b| handicapped(a.0, &a.1).total_cmp(&handicapped(b.0, &b.1)));
         for (loss, solution) in fits.iter_mut().take(FINALISTS) {
+            if progress.interrupted() {
+                break;
+            }
             *solution = fit(objective, &solution.model, own, &[FINE_STEP])?;
             *loss = objective.mean_loss(&solution.residuals, Part::HeldOut);
         }
@@ -140,8 +148,10 @@ pub fn select(
         chosen.push(Chosen { effect, model, loss_before, loss_after, others });
         present = solution;
     }
-    prune(objective, own, &mut present, &mut chosen, progress)?;
-    Ok(Selected { baseline, solution: present, chosen })
+    if !progress.interrupted() {
+        prune(objective, own, &mut present, &mut chosen, progress)?;
+    }
+    Ok(Selected { baseline, solution: present, chosen, complete: !progress.interrupted() })
 }
 
 /// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.
@@ -186,7 +196,7 @@ fn prune(
     }
     progress.stage("testing each effect again", chosen.len() as u64);
     let mut index = 0;
-    while index < chosen.len() && chosen.len() > 1 {
+    while index < chosen.len() && chosen.len() > 1 && !progress.interrupted() {
         let loss_with = objective.mean_loss(&present.residuals, Part::HeldOut);
         let mut without = present.model.clone();
         without.effects.remove(own + index);

@@ -146,6 +146,8 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// In two sentences.
     pub summary: String,
+    /// Whether every effect was tried; false after Ctrl-C.
+    pub complete: bool,
     /// Effects, most certain first.
     pub effects: Vec<NamedEffect>,
     /// Every nominal parameter that was fitted.

@@ -17,6 +17,9 @@ const EVEN_IMPROVEMENT: f64 = 0.1;
 /// Odds below which a rival is not listed.
 const LISTED_ODDS: f64 = 0.03;
 
+/// What a summary says after Ctrl-C.
+pub(super) const STOPPED: &str = "The search was stopped before every effect had been tried.";
+
 /// Probability of the chosen effect, and what it could be instead. `separate` finds the experiment that parts the two;
 /// where it finds none, a general one is named.
 pub(super) fn rivals(

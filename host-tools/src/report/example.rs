@@ -145,6 +145,7 @@ fn diagnosis() -> Diagnosis {
         rig: "bench 3, left elbow".into(),
         recordings: vec!["elbow_triangle.mcap".into()],
         heldout: vec!["elbow_triangle.mcap, 8.00 s to 12.00 s".into(), "elbow_triangle.mcap, 30.00 s to 36.00 s".into()],
+        complete: true,
         written_by: "bowden 0.1.0".into(),
     }
 }

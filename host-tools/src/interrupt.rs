@@ -1,4 +1,4 @@
-//! Ctrl-C: the joint is switched off before the program ends.
+//! Ctrl-C: before the program ends, a joint is switched off and what was found so far is written.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

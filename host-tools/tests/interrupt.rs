@@ -1,0 +1,94 @@
+//! Ctrl-C during a diagnosis: what was found so far is written, and said to be incomplete.
+#![cfg(unix)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+const RIG: &str = r#"schema = "bowden-rig/1"
+name = "bench"
+[motor]
+supply_v = 24.0
+resistance_ohm = 2.0
+inductance_h = 0.0008
+torque_constant_nm_per_a = 0.03
+gear_ratio = 30.0
+rotor_inertia_kg_m2 = 5.0e-6
+viscous_nm_s_per_rad = 0.02
+[pulleys]
+input_radius_m = 0.015
+output_radius_m = 0.020
+[tendon]
+length_m = 1.0
+axial_stiffness_n = 72900.0
+pretension_n = 30.0
+[sheath]
+wrap_angle_rad = 3.14159265
+friction_coefficient = 0.12
+[load]
+mass_kg = 2.5
+arm_m = 0.03
+inertia_kg_m2 = 0.0
+viscous_nm_s_per_rad = 0.004
+[sensors]
+encoder_bits = 12
+tension_full_scale_n = 98.0665
+adc_bits = 12
+tension_noise_n = 0.1
+current_noise_a = 0.01
+"#;
+
+fn bowden(folder: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_bowden"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+fn wait(mut child: Child) -> Output {
+    let limit = Instant::now() + Duration::from_secs(120);
+    while child.try_wait().unwrap().is_none() {
+        assert!(Instant::now() < limit, "it goes on after two minutes");
+        sleep(Duration::from_millis(20));
+    }
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn an_interrupted_diagnosis_leaves_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    fs::write(place.join("rig.toml"), RIG).unwrap();
+    // Another rig than the one that is diagnosed, so that there is something to look for.
+    fs::write(place.join("true.toml"), RIG.replace("= 0.12", "= 0.16")).unwrap();
+    let made =
+        wait(bowden(place, &["simulate", "--rig", "true.toml", "--out", "run.csv", "--seconds", "60"]));
+    assert!(made.status.success());
+
+    let child = bowden(place, &["diagnose", "run.csv", "--rig", "rig.toml", "--out", "found"]);
+    // The folder is made once the recording has been read; the search then takes many times longer than this wait.
+    let limit = Instant::now() + Duration::from_secs(60);
+    while !place.join("found").exists() {
+        assert!(Instant::now() < limit, "the recording is not read");
+        sleep(Duration::from_millis(5));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let output = wait(child);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("stopped early"), "{said}");
+
+    let found = place.join("found");
+    let text = fs::read_to_string(found.join("diagnosis.json")).unwrap();
+    let diagnosis: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(diagnosis["complete"], false);
+    assert_eq!(diagnosis["effects"].as_array().map(Vec::len), Some(0));
+    assert!(fs::read_to_string(found.join("report.html")).unwrap().contains("stopped before every effect"));
+    assert!(found.join("rig.diagnosed.toml").exists());
+}
