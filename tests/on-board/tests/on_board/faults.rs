@@ -35,7 +35,8 @@ fn a_frame_of_another_type_of_encoder_does_not_pass() -> Outcome {
 
 #[test]
 fn an_encoder_bus_that_stands_is_a_missing_encoder() -> Outcome {
-    injected(Injection::EncoderBus(EncoderAt::Input), Fault::EncoderMissing, 0, FRAMES_S).map(|_| ())
+    injected(Injection::EncoderBus(EncoderAt::Input), Fault::EncoderMissing, 0, FRAMES_S)?;
+    injected(Injection::EncoderBus(EncoderAt::Joint), Fault::EncoderMissing, 1, FRAMES_S).map(|_| ())
 }
 
 #[test]
