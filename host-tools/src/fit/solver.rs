@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::free::Free;
-use super::objective::{Objective, Part, Residuals, soft};
+use super::objective::{Aspect, Entry, Objective, Part, Residuals, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 
@@ -238,14 +238,65 @@ pub fn solve_with_slopes(
     let variance = (rows.norm_squared()
         / (rows.len() as f64 / CORRELATED_BLOCKS - free.len() as f64).max(1.0))
     .max(1e-300);
+    let alike = problem.current.as_ref().map_or(1.0, |residuals| blocks_alike(objective, residuals));
+    let spread = (variance * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt();
     let stds = standard_deviations(&jacobian, &fixed)
         .into_iter()
         .zip(free.iter().zip(&values))
-        .map(|(std, (free, value))| std.map(|s| s * variance.sqrt() * free.slope_at(*value)))
+        .map(|(std, (free, value))| std.map(|s| s * spread * free.slope_at(*value)))
         .collect();
     let model = problem.model_at(&x);
     let residuals = everything.residuals(&model)?;
     Ok(Solution { model, values, stds, residuals, jacobian })
+}
+
+/// Over how many blocks the residuals of the fitted model stay alike, on average: what is left is mostly the difference
+/// between two descriptions of the same contact, which lasts as long as a motion does, and tells so much less.
+fn blocks_alike(objective: &Objective, residuals: &Residuals) -> f64 {
+    let (mut weighted, mut weight) = (0.0, 0.0);
+    let mut run: Vec<f64> = Vec::new();
+    let mut before: Option<Entry> = None;
+    let mut close = |run: &mut Vec<f64>| {
+        // A shorter run does not show how long its values stay alike.
+        if run.len() >= 4 {
+            let power: f64 = run.iter().map(|r| r * r).sum();
+            weighted += power * autocorrelation_time(run);
+            weight += power;
+        }
+        run.clear();
+    };
+    for (entry, value) in objective.entries().zip(&residuals.values) {
+        let follows = before.is_some_and(|before| {
+            (before.series, before.recording, before.aspect) == (entry.series, entry.recording, entry.aspect)
+        });
+        if !follows {
+            close(&mut run);
+        }
+        if entry.aspect == Aspect::Mean && entry.block.part == Part::Training {
+            run.push(soft(*value));
+        }
+        before = Some(entry);
+    }
+    close(&mut run);
+    if weight > 0.0 { weighted / weight } else { 1.0 }
+}
+
+/// Integrated autocorrelation time `1 + 2 Σ ρ_k` of values about zero, in samples, summed up to five times itself
+/// (Sokal's window); at least 1.
+fn autocorrelation_time(values: &[f64]) -> f64 {
+    let at = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>();
+    let power = at(0);
+    if power <= 0.0 {
+        return 1.0;
+    }
+    let mut time = 1.0;
+    for lag in 1..values.len() {
+        if lag as f64 >= 5.0 * time {
+            break;
+        }
+        time += 2.0 * at(lag) / power;
+    }
+    time.max(1.0)
 }
 
 /// Square roots of the diagonal of `(JᵀJ)⁻¹`.
@@ -266,4 +317,30 @@ fn standard_deviations(jacobian: &DMatrix<f64>, fixed: &[bool]) -> Vec<Option<f6
         }
     }
     stds
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64;
+
+    use super::autocorrelation_time;
+
+    /// A first-order process of pole `p` stays alike for `(1 + p)/(1 - p)` samples.
+    #[test]
+    fn values_stay_alike_as_long_as_their_process_says() {
+        let mut random = Pcg64::new(7, 11);
+        for (pole, expected) in [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)] {
+            let mut state = 0.0;
+            let values: Vec<f64> = (0..40_000)
+                .map(|_| {
+                    let noise: f64 = StandardNormal.sample(&mut random);
+                    state = pole * state + noise;
+                    state
+                })
+                .collect();
+            let time = autocorrelation_time(&values);
+            assert!((time / expected - 1.0).abs() < 0.12, "pole {pole}: {time} samples, expected {expected}");
+        }
+    }
 }
