@@ -15,7 +15,7 @@ use bowden_tests::prove::run::{key, run};
 use bowden_tests::prove::score::{concealed_shortly, said_shortly, score};
 use bowden_tests::prove::summary::Summary;
 use bowden_tests::prove::tool::Tool;
-use clap::Parser;
+use clap::{Args, Parser};
 
 /// Hide effects in rigs of the virtual bench and count how often `bowden diagnose` finds them
 ///
@@ -43,15 +43,11 @@ struct Options {
     /// Do every case again, also those that were done with this binary
     #[arg(long)]
     fresh: bool,
-    /// Run nothing: print what has been done so far
-    #[arg(long)]
-    so_far: bool,
     /// Exit status 1 if a goal is missed
     #[arg(long)]
     strict: bool,
-    /// List the cases with their seeds and do nothing
-    #[arg(long)]
-    list: bool,
+    #[command(flatten)]
+    show: Show,
     /// The binary to prove
     #[arg(long, value_name = "FILE", default_value = "target/release/bowden")]
     bowden: PathBuf,
@@ -61,6 +57,17 @@ struct Options {
     /// Page that a complete run writes
     #[arg(long, value_name = "FILE")]
     proof: Option<PathBuf>,
+}
+
+/// What is shown without running anything.
+#[derive(Debug, Args)]
+struct Show {
+    /// List the cases with their seeds and do nothing
+    #[arg(long)]
+    list: bool,
+    /// Run nothing: print what has been done so far with this binary
+    #[arg(long)]
+    so_far: bool,
 }
 
 fn main() -> ExitCode {
@@ -78,7 +85,7 @@ fn main() -> ExitCode {
 /// Whether the goals are met, or need not be.
 fn prove(options: &Options) -> Result<bool, String> {
     let plans = chosen(options)?;
-    if options.list {
+    if options.show.list {
         for plan in &plans {
             println!("{:<50} {:>7}  {}", plan.name, plan.seed, plan.hidden().join(", "));
         }
@@ -177,7 +184,7 @@ impl Work<'_> {
     fn one(&self, plan: &Plan) -> Result<Option<Outcome>, String> {
         let case = plan.case().map_err(|error| format!("{}: {error}", plan.name))?;
         let known = self.log.find(&plan.name, &key(self.tool, plan, &case));
-        if self.options.so_far {
+        if self.options.show.so_far {
             return Ok(known.cloned());
         }
         if let Some(known) = known.filter(|_| !self.options.fresh) {

@@ -80,16 +80,16 @@ fn groups(page: &mut String, summary: &Summary) -> std::fmt::Result {
     )?;
     writeln!(
         page,
-        "| group | cases | right | first name | all named | exact | false alarms | component | ratio, median | ratio, 90 % |"
+        "| group | cases | right | first name | all named | exact | false alarms | unexplained | component | ratio, median | ratio, 90 % |"
     )?;
-    writeln!(page, "|---|---|---|---|---|---|---|---|---|---|")?;
+    writeln!(page, "|---|---|---|---|---|---|---|---|---|---|---|")?;
     for group in Group::ALL {
         let scores: Vec<&Score> = summary.group(group).collect();
         if scores.is_empty() {
             continue;
         }
         let share =
-            |rate: Rate| rate.share().map_or("".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+            |rate: Rate| rate.share().map_or(String::new(), |share| format!("{:.0} %", 100.0 * share));
         let of = |answer: fn(&Score) -> Option<bool>| {
             share(Rate::count(scores.iter().filter_map(|score| answer(score))))
         };
@@ -97,13 +97,14 @@ fn groups(page: &mut String, summary: &Summary) -> std::fmt::Result {
         let ratios = || scores.iter().filter_map(|score| score.heldout_ratio);
         writeln!(
             page,
-            "| {} | {} | {} | {} | {} | {} | {alarms} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {alarms} | {} | {} | {} | {} |",
             group.name(),
             scores.len(),
             of(|score| Some(score.right)),
             of(|score| score.top1),
             of(|score| score.all_named),
             of(|score| Some(score.exact)),
+            of(|score| Some(score.unexplained)),
             of(|score| score.component),
             number(median(ratios()), 2),
             number(quantile(ratios(), 0.9), 2),
@@ -163,7 +164,8 @@ fn by_effect(page: &mut String, summary: &Summary) -> std::fmt::Result {
     }
     writeln!(
         page,
-        "\n## By effect\n\nWorth: held-out error of the true rig without the effect over that with it, smallest and largest.\n\n\
+        "\n## By effect\n\nWorth: held-out error of the true rig without the effect over that with it, smallest and largest; below 1 the\n\
+         replay with the effect is worse than without, and nobody could find it by its predictions.\n\n\
          | concealed alone | cases | right | worth | parameter error, median | ratio, median |\n|---|---|---|---|---|---|"
     )?;
     for ((group, id), scores) in rows {
@@ -202,6 +204,7 @@ fn failures(page: &mut String, summary: &Summary) -> std::fmt::Result {
     if count == 0 {
         return Ok(());
     }
+    writeln!(page, "`cargo xtask prove --only CASE --out DIR` runs one again and keeps its files.\n")?;
     writeln!(page, "| case | seed | concealed | said | what the files tell |\n|---|---|---|---|---|")?;
     for (outcome, score) in summary.failed() {
         let (name, seed) = (&outcome.name, outcome.seed);

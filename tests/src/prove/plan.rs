@@ -189,7 +189,7 @@ pub fn plans(seed: u64) -> Vec<Plan> {
             let plan = Plan::new(group, &format!("{number:02}"), seed);
             let noise = noises[number % 2].1;
             let off = if group == Group::Parameters { wrong_parameters(plan.seed) } else { Vec::new() };
-            plans.push(Plan { noise, off, ..plan });
+            plans.push(Plan { off, noise, ..plan });
         }
     }
     plans.sort_by_key(|plan| plan.group);
@@ -312,7 +312,7 @@ mod tests {
             let ratio = case.truth.friction_coefficient / case.nominal.friction_coefficient;
             match plan.group {
                 Group::Nothing => {
-                    assert!(case.effects.is_empty() && plan.off.is_empty() && (ratio - 1.0).abs() < 0.16)
+                    assert!(case.effects.is_empty() && plan.off.is_empty() && (ratio - 1.0).abs() < 0.16);
                 }
                 Group::Parameters => {
                     assert!(case.effects.is_empty() && (1..=3).contains(&plan.off.len()), "{}", plan.name);

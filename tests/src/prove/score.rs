@@ -17,6 +17,8 @@ pub struct Score {
     pub exact: bool,
     /// Named effects that are not concealed.
     pub false_alarms: Vec<String>,
+    /// Whether structure is left that the diagnosis explains by nothing it named.
+    pub unexplained: bool,
     /// Whether the first named effect, or what is left unexplained, lies in a component that conceals something.
     pub component: Option<bool>,
     /// Stated onset minus true one, s, for each concealed effect that has one and is named.
@@ -36,12 +38,9 @@ pub struct Score {
 /// Scores an outcome.
 #[must_use]
 pub fn score(outcome: &Outcome) -> Score {
+    let silent = catalogued(outcome).then_some(false);
     let Some(said) = &outcome.said else {
-        return Score {
-            top1: catalogued(outcome).then_some(false),
-            all_named: catalogued(outcome).then_some(false),
-            ..Score::default()
-        };
+        return Score { top1: silent, all_named: silent, ..Score::default() };
     };
     let truth = &outcome.truth;
     let concealed = |id: &str| truth.effects.iter().any(|effect| effect.id == id);
@@ -62,6 +61,7 @@ pub fn score(outcome: &Outcome) -> Score {
         all_named: catalogued(outcome).then_some(all_named),
         exact,
         false_alarms,
+        unexplained: said.unexplained.is_some(),
         component: component(said, truth),
         onset_errors_s: of_named(said, truth)
             .filter_map(|(true_effect, effect)| Some(effect.onset_s? - true_effect.onset_s?))

@@ -217,9 +217,9 @@ impl Summary {
             let mut concealed: Vec<String> = truth.effects.iter().map(|effect| effect.id.clone()).collect();
             concealed.extend(truth.outside.iter().map(|(id, _)| id.clone()));
             let Some(said) = &outcome.said else {
-                concealed
-                    .into_iter()
-                    .for_each(|id| *cells.entry((id, "no diagnosis".to_owned())).or_default() += 1);
+                for id in concealed {
+                    *cells.entry((id, "no diagnosis".to_owned())).or_default() += 1;
+                }
                 continue;
             };
             let mut named: Vec<String> = said.effects.iter().map(|effect| effect.id.clone()).collect();

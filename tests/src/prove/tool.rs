@@ -1,7 +1,8 @@
 //! The program under test, as its users meet it: a process that sees files only.
 
 use std::fs::{self, File};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{DefaultHasher, Hasher};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
@@ -16,6 +17,9 @@ const LIMIT: Duration = Duration::from_mins(10);
 
 /// How often a running program is asked whether it is done.
 const POLL: Duration = Duration::from_millis(10);
+
+/// Bytes of the binary that are hashed at a time.
+const PIECE: usize = 1 << 16;
 
 /// Samples at the beginning of a replay that are not compared: the simulation starts from rest.
 const SETTLING_SAMPLES: usize = 300;
@@ -37,11 +41,20 @@ impl Tool {
     /// # Errors
     /// When it cannot be read.
     pub fn new(path: &Path, threads: usize) -> Result<Self, String> {
-        let bytes = fs::read(path).map_err(|error| {
+        let failed = |error: std::io::Error| {
             format!("{}: {error}; expected the binary of bowden, built with --release", path.display())
-        })?;
+        };
+        // Piece by piece: a child's peak memory counts from what this process has in memory.
+        let mut file = File::open(path).map_err(failed)?;
         let mut hasher = DefaultHasher::new();
-        bytes.hash(&mut hasher);
+        let mut piece = vec![0; PIECE];
+        loop {
+            let length = file.read(&mut piece).map_err(failed)?;
+            if length == 0 {
+                break;
+            }
+            hasher.write(&piece[..length]);
+        }
         Ok(Self { path: path.to_owned(), threads, hash: hasher.finish() })
     }
 
@@ -169,6 +182,7 @@ fn errors(path: &Path, recorded: &virtual_bench::Recording) -> Result<Errors, St
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fmt::Write as _;
     use virtual_bench::{BenchConfig, Motion, MotionKind, record};
 
     #[test]
@@ -180,12 +194,9 @@ mod tests {
         let mut text = "t_s,f1_n,theta_out_rad\n".to_owned();
         for row in 0..recorded.len() {
             let off = if row < SETTLING_SAMPLES { 9.0 } else { 0.5 };
-            text += &format!(
-                "{},{},{}\n",
-                recorded.t_s[row],
-                recorded.f1_n[row] + off,
-                recorded.theta_out_rad[row]
-            );
+            let (t_s, f1_n, theta_rad) =
+                (recorded.t_s[row], recorded.f1_n[row] + off, recorded.theta_out_rad[row]);
+            writeln!(text, "{t_s},{f1_n},{theta_rad}").unwrap();
         }
         fs::write(&path, &text).unwrap();
         let found = errors(&path, &recorded).unwrap();
