@@ -12,9 +12,11 @@ use bowden::recording::Recording;
 use bowden::replay;
 use bowden::rig::{Rig, RigDocument};
 use bowden_model::channel::Channel;
+use bowden_model::effects::find;
 use bowden_tests::{recording_of, rms_difference};
 use virtual_bench::{
-    Case, JointBacklash, MotionKind, MotorCoulombFriction, Parameter, PretensionLoss, SensorGainError,
+    Case, ConcealedEffect, JointBacklash, MotionKind, MotorCoulombFriction, Parameter, PretensionLoss,
+    SensorGainError,
 };
 
 /// Length of the diagnosed recordings, s.
@@ -158,4 +160,16 @@ fn wrong_parameters_alone() {
         assert!((found_ratio / ratio - 1.0).abs() < 0.06, "{path}: {found_ratio} for {ratio}");
     }
     outcome.predicts_within(0.5);
+}
+
+#[test]
+fn a_parameter_that_is_not_searched_is_not_reported() {
+    // The looseness of a slack tendon keeps its default; what is reported are the parameters that were fitted.
+    let case = Case::new("case", vec![ConcealedEffect::drawn("tendon_slack", 1.5, 7).unwrap()], 107, 3.0);
+    let outcome = Outcome::of(&case);
+    let effect = outcome.only_effect();
+    assert_eq!((effect.id.as_str(), effect.component.as_str()), ("tendon_slack", "transmission"));
+    let searched = find("tendon_slack").unwrap().descriptor().parameters.iter().filter(|spec| spec.searched);
+    assert!(effect.parameters.keys().eq(searched.map(|spec| spec.name)), "{:?}", effect.parameters);
+    outcome.predicts_within(0.9);
 }
