@@ -223,7 +223,8 @@ pub struct StepInput {
     pub theta_in_rad: f64,
     /// Output pulley at the end of the step, rad.
     pub theta_out_rad: f64,
-    /// Torque from outside on the rotor, N·m at the input pulley; positive accelerates it.
+    /// Torque from outside on the input pulley, N·m; positive accelerates it. Inside a play of the gear it moves the pulley
+    /// and not the rotor.
     pub input_torque_nm: f64,
     /// Torque from outside on the joint, N·m; positive accelerates it.
     pub external_torque_nm: f64,
@@ -399,8 +400,13 @@ impl Plant {
                 self.theta_motor_rad += delta_rad;
                 self.turn_input(config, delta_rad);
                 if play_rad > 0.0 || self.gear_offset_rad != 0.0 {
-                    self.gear_offset_rad =
-                        self.relax_play(config, End::Input, self.gear_offset_rad, play_rad);
+                    self.gear_offset_rad = self.relax_play(
+                        config,
+                        End::Input,
+                        input.input_torque_nm,
+                        self.gear_offset_rad,
+                        play_rad,
+                    );
                 }
                 let before = self.theta_in_rad;
                 self.theta_in_rad = self.theta_motor_rad - self.gear_offset_rad;
@@ -550,7 +556,7 @@ impl Plant {
         if port.play_rad > 0.0 || self.joint_offset_rad != 0.0 {
             let before = self.joint_offset_rad.abs();
             self.joint_offset_rad =
-                self.relax_play(config, End::Output, self.joint_offset_rad, port.play_rad);
+                self.relax_play(config, End::Output, 0.0, self.joint_offset_rad, port.play_rad);
             let half = 0.5 * port.play_rad;
             if self.joint_offset_rad.abs() >= half && before < half {
                 let closing_rad_s = Self::pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
@@ -723,9 +729,16 @@ impl Plant {
         }
     }
 
-    fn relax_play(&mut self, config: &PlantConfig, end: End, offset_rad: f64, play_rad: f64) -> f64 {
+    fn relax_play(
+        &mut self,
+        config: &PlantConfig,
+        end: End,
+        outside_nm: f64,
+        offset_rad: f64,
+        play_rad: f64,
+    ) -> f64 {
         match (&mut self.transmission, &config.transmission) {
-            (Some(state), Some(parts)) => state.relax_play(parts, end, offset_rad, play_rad),
+            (Some(state), Some(parts)) => state.relax_play(parts, end, outside_nm, offset_rad, play_rad),
             _ => 0.0,
         }
     }

@@ -225,11 +225,13 @@ impl Transmission {
     pub fn turn_input(&mut self, config: &TransmissionConfig, delta_rad: f64) {
         self.turn(config, End::Input, delta_rad);
         if self.play_rad > 0.0 || self.play_offset_rad != 0.0 {
-            self.play_offset_rad = self.relax_play(config, End::Input, self.play_offset_rad, self.play_rad);
+            self.play_offset_rad =
+                self.relax_play(config, End::Input, 0.0, self.play_offset_rad, self.play_rad);
         }
     }
 
-    /// Lets a pulley without inertia move inside a play until the cables leave it without torque or the play ends.
+    /// Lets a pulley without inertia move inside a play until the cables balance `outside_nm`, a torque on the pulley, or the
+    /// play ends.
     ///
     /// `offset_rad` is how far the driving side leads: motor or input pulley before the tendons ([`End::Input`]), output
     /// pulley before the arm ([`End::Output`]). Returns the new lead, within ± half of `play_rad`. The first step assumes
@@ -239,6 +241,7 @@ impl Transmission {
         &mut self,
         config: &TransmissionConfig,
         end: End,
+        outside_nm: f64,
         offset_rad: f64,
         play_rad: f64,
     ) -> f64 {
@@ -247,8 +250,8 @@ impl Transmission {
         let mut stiffness = config.sticking_stiffness_nm_per_rad(end);
         for _ in 0..PLAY_STEPS {
             let torque_nm = match end {
-                End::Input => self.torque_in_nm(config),
-                End::Output => self.torque_out_nm(config),
+                End::Input => self.torque_in_nm(config) - outside_nm,
+                End::Output => self.torque_out_nm(config) - outside_nm,
             };
             let wanted = (offset_rad + torque_nm / stiffness).clamp(-half, half);
             let moved = wanted - offset_rad;

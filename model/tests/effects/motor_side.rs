@@ -135,6 +135,23 @@ fn backlash_lets_the_rotor_turn_alone() {
     }
 }
 
+/// A torque from outside turns the pulley inside the play until the cables balance it; the rotor stays where it is.
+#[test]
+fn inside_a_play_the_pulley_gives_way_and_not_the_rotor() {
+    let mut parameters = joint(0.0);
+    parameters.motor = Some(MOTOR);
+    let boundaries = (InputBoundary::Motor, OutputBoundary::Angle);
+    let mut run = Run::new(parameters, &[effect("gear_backlash")], boundaries, 5e-4);
+    for outside_nm in [0.1, -0.05, 0.1] {
+        let until_s = run.plant.t_s() + 0.5;
+        run.until(until_s, |_| StepInput { input_torque_nm: outside_nm, ..duty(0.0) });
+        near("torque of the cables", run.plant.torque_in_nm(&run.config), outside_nm, 1e-6);
+        near("rotor", run.plant.theta_motor_rad(), 0.0, 1e-9);
+        let turned_rad = run.plant.theta_in_rad();
+        assert!(turned_rad * outside_nm > 0.0 && turned_rad.abs() < 0.01, "turned by {turned_rad} rad");
+    }
+}
+
 /// At a mean speed Ω the ripple A sin(nΩt) meets the rotor's inertia, its damping and the winding: amplitude of the speed
 /// A/|jnΩ I + b + k²/(R + jnΩ L)|. Linear in A, which the 0.5 % of speed ripple justify; 1 % for the explicit step.
 #[test]
