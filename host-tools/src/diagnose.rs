@@ -7,6 +7,7 @@
 //! 4. An effect is named only if it improves held-out data by more than the difference that any two realities have.
 //! 5. The named physics is fitted once more to all data and written as a rig file.
 
+mod afterwards;
 mod candidates;
 mod experiment;
 mod place;
@@ -20,7 +21,7 @@ use std::collections::BTreeMap;
 
 use bowden_model::effect::ActiveEffect;
 
-use crate::fit::free::{Free, recalibrated};
+use crate::fit::free::{Free, Place, recalibrated};
 use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::joint_model::JointModel;
@@ -29,6 +30,7 @@ use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::rig::{Rig, RigDocument};
 use crate::simulation::Prediction;
+use afterwards::afterwards;
 pub use experiment::Experiment;
 use experiment::Shown;
 use selection::{Chosen, Selected, Tried, select};
@@ -53,42 +55,26 @@ const FINAL_PATIENCE: usize = 8;
 pub struct Diagnosed {
     /// Verdict, plots and numbers.
     pub findings: Findings,
-    /// Nominal parameters that fit: section, name, value.
-    parameters: Vec<(&'static str, &'static str, f64)>,
-    effects: Vec<ActiveEffect>,
     /// Motions that would part the named effects from those that could not be excluded.
     pub experiments: Vec<Experiment>,
-    /// Time that the fitted recordings took.
-    clock_s: f64,
+    /// The bench after the recordings.
+    now: JointModel,
+    /// Effects of `now` that the rig stated itself; they come first.
+    own: usize,
 }
 
 impl Diagnosed {
-    /// Writes the diagnosed physics into a rig file: the bench as it is after the recordings. What happened at a moment has
-    /// happened, what has passed is gone, and a drift goes on from where it is.
+    /// Writes the diagnosed physics into a rig file: the bench as it is after the recordings.
     ///
     /// # Errors
     /// When the file cannot take a value.
     pub fn write_into(&self, document: &mut RigDocument) -> Result<(), Failure> {
-        let drift = self.effects.iter().find(|effect| effect.descriptor().id == "friction_drift");
-        let drifted = drift.map_or(1.0, |effect| (1.0 + effect.parameters[0] * self.clock_s).max(0.0));
-        for (section, name, value) in &self.parameters {
-            let now = if *name == "friction_coefficient" { value * drifted } else { *value };
-            document.set_nominal(section, name, now)?;
-        }
-        for effect in &self.effects {
-            if let Some(effect) = self.as_it_is_now(*effect, drifted) {
-                document.add_effect(&effect)?;
+        for free in recalibrated(&self.now) {
+            if let Place::Nominal(parameter) = free.place() {
+                document.set_nominal(parameter.section, parameter.spec.name, free.start())?;
             }
         }
-        Ok(())
-    }
-
-    fn as_it_is_now(&self, effect: ActiveEffect, drifted: f64) -> Option<ActiveEffect> {
-        match effect.descriptor().id {
-            "wrap_angle_disturbed" if effect.parameters[1] + effect.parameters[2] < self.clock_s => None,
-            "friction_drift" => Some(effect.with("rate_per_s", effect.parameters[0] / drifted.max(1e-3))),
-            _ => Some(effect.with("time_s", 0.0)),
-        }
+        self.now.effects[self.own..].iter().try_for_each(|effect| document.add_effect(effect))
     }
 }
 
@@ -181,6 +167,7 @@ impl Case<'_> {
             })
             .collect();
         let own = model.effects.len();
+        let clock_s = objective.duration_s();
         let mut first_value = nominal.len();
         let shown = Shown::by(&training.iter().chain(heldout).collect::<Vec<_>>());
         let mut experiments = Vec::new();
@@ -190,7 +177,7 @@ impl Case<'_> {
             let count = active.descriptor().parameters.iter().filter(|spec| spec.searched).count();
             let values = first_value..first_value + count;
             let separate = |tried: &Tried| {
-                let found = experiment::separating(rig, chosen, tried, &shown)?;
+                let found = experiment::separating(rig, chosen, tried, &shown, clock_s)?;
                 let words = found.in_words();
                 experiments.push(found);
                 Some(words)
@@ -251,26 +238,15 @@ impl Case<'_> {
             },
             written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
         };
-        let parameters = nominal
-            .iter()
-            .zip(&last.values)
-            .filter_map(|(free, value)| match free.place() {
-                crate::fit::free::Place::Nominal(parameter) => {
-                    Some((parameter.section, parameter.spec.name, *value))
-                }
-                crate::fit::free::Place::Effect { .. } => None,
-            })
-            .collect();
         Diagnosed {
             findings: Findings {
                 diagnosis,
                 traces: traces(objective, stages),
                 regimes: place::regimes(objective, stages),
             },
-            parameters,
             experiments,
-            effects: last.model.effects[own..].to_vec(),
-            clock_s: objective.duration_s(),
+            now: afterwards(&last.model, own, clock_s),
+            own,
         }
     }
 }

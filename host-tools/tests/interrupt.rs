@@ -7,38 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-const RIG: &str = r#"schema = "bowden-rig/1"
-name = "bench"
-[motor]
-supply_v = 24.0
-resistance_ohm = 2.0
-inductance_h = 0.0008
-torque_constant_nm_per_a = 0.03
-gear_ratio = 30.0
-rotor_inertia_kg_m2 = 5.0e-6
-viscous_nm_s_per_rad = 0.02
-[pulleys]
-input_radius_m = 0.015
-output_radius_m = 0.020
-[tendon]
-length_m = 1.0
-axial_stiffness_n = 72900.0
-pretension_n = 30.0
-[sheath]
-wrap_angle_rad = 3.14159265
-friction_coefficient = 0.12
-[load]
-mass_kg = 2.5
-arm_m = 0.03
-inertia_kg_m2 = 0.0
-viscous_nm_s_per_rad = 0.004
-[sensors]
-encoder_bits = 12
-tension_full_scale_n = 98.0665
-adc_bits = 12
-tension_noise_n = 0.1
-current_noise_a = 0.01
-"#;
+const RIG: &str = include_str!("rigs/bench.toml");
 
 fn bowden(folder: &Path, arguments: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_bowden"))

@@ -25,8 +25,8 @@ pub struct DiagnoseArguments {
     /// Rig file: what the bench is believed to be
     #[arg(long, value_name = "RIG.toml")]
     rig: PathBuf,
-    /// Folder for diagnosis.json, report.html rig.diagnosed.toml and the references of
-    /// experiments worth doing; made if it is not there
+    /// Folder for diagnosis.json, report.html, rig.diagnosed.toml and references of experiments worth
+    /// doing; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Recordings that judge the diagnosis and take no other part; without them a part of the others is held out

@@ -7,6 +7,7 @@
 use bowden_model::channel::Channel;
 use rayon::prelude::*;
 
+use super::afterwards::afterwards;
 use super::selection::{Chosen, Tried};
 use crate::fit::objective::{Objective, Part};
 use crate::joint_model::JointModel;
@@ -171,8 +172,15 @@ impl Experiment {
 
 /// The motion on which the chosen effect and another one part most; `None` where no allowed motion parts them, or no
 /// forward run is possible.
-pub(super) fn separating(rig: &Rig, chosen: &Chosen, rival: &Tried, shown: &Shown) -> Option<Experiment> {
-    let [named, other] = [&chosen.model, &rival.model].map(as_it_is_now);
+pub(super) fn separating(
+    rig: &Rig,
+    chosen: &Chosen,
+    rival: &Tried,
+    shown: &Shown,
+    clock_s: f64,
+) -> Option<Experiment> {
+    let own = rig.effects.len();
+    let [named, other] = [&chosen.model, &rival.model].map(|model| afterwards(model, own, clock_s));
     let [low, high] = shown.angle_rad;
     let middle = 0.5 * (low + high);
     let bench = Rig { joint: named.parameters, effects: named.effects.clone(), ..rig.clone() };
@@ -194,12 +202,6 @@ pub(super) fn separating(rig: &Rig, chosen: &Chosen, rival: &Tried, shown: &Show
         .filter(|experiment| experiment.separation > TELLING)
         // The first of equals, so that the number of threads does not matter.
         .reduce_with(|a, b| if b.separation > a.separation { b } else { a })
-}
-
-/// What happened at a moment has happened.
-fn as_it_is_now(model: &JointModel) -> JointModel {
-    let effects = model.effects.iter().map(|effect| effect.with("time_s", 0.0)).collect();
-    JointModel { effects, ..model.clone() }
 }
 
 /// Mean loss of a replay of `run`.
@@ -243,40 +245,6 @@ mod tests {
         }
     }
 
-    const BENCH: &str = r#"
-schema = "bowden-rig/1"
-name = "bench"
-[motor]
-supply_v = 24.0
-resistance_ohm = 2.0
-inductance_h = 0.0008
-torque_constant_nm_per_a = 0.03
-gear_ratio = 30.0
-rotor_inertia_kg_m2 = 5.0e-6
-viscous_nm_s_per_rad = 0.02
-[pulleys]
-input_radius_m = 0.015
-output_radius_m = 0.020
-[tendon]
-length_m = 1.0
-axial_stiffness_n = 72900.0
-pretension_n = 30.0
-[sheath]
-wrap_angle_rad = 3.14159265
-friction_coefficient = 0.12
-[load]
-mass_kg = 2.5
-arm_m = 0.03
-inertia_kg_m2 = 0.0
-viscous_nm_s_per_rad = 0.004
-[sensors]
-encoder_bits = 12
-tension_full_scale_n = 98.0665
-adc_bits = 12
-tension_noise_n = 0.1
-current_noise_a = 0.01
-"#;
-
     fn by_default(id: &str) -> ActiveEffect {
         ActiveEffect::with_defaults(find(id).unwrap())
     }
@@ -287,7 +255,7 @@ current_noise_a = 0.01
     }
 
     fn parts(named: &str, rival: ActiveEffect, shown: &Shown) -> Option<Experiment> {
-        let rig = Rig::parse(BENCH, "bench").unwrap();
+        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
         let t_s: Vec<f64> = (0..100).map(|k| f64::from(k) * 1e-3).collect();
         let every =
             [Channel::ThetaIn, Channel::ThetaOut, Channel::Duty, Channel::BusVoltage, Channel::MotorCurrent];
@@ -299,7 +267,7 @@ current_noise_a = 0.01
         let with = |effect| (effect, JointModel { effects: vec![effect], ..model.clone() });
         let ((effect, named), (other, rival)) = (with(by_default(named)), with(rival));
         let chosen = Chosen { effect, model: named, loss_before: 2.0, loss_after: 1.0, others: Vec::new() };
-        separating(&rig, &chosen, &Tried { effect: other, model: rival, heldout_loss: 1.1 }, shown)
+        separating(&rig, &chosen, &Tried { effect: other, model: rival, heldout_loss: 1.1 }, shown, 40.0)
     }
 
     const ANYTHING: Shown =

@@ -35,7 +35,7 @@ pub fn screen(
     candidates: &[Candidate],
     progress: &dyn Progress,
 ) -> Vec<Screened> {
-    let objective = &objective.fitted();
+    let [objective, _] = &objective.split();
     let basis = Basis::new(&present.jacobian);
     let now = basis.without(&rows(objective, &present.residuals));
     let loss_now = now.norm_squared();
@@ -80,7 +80,7 @@ fn judge(
     let mut with = model.clone();
     with.effects.push(start);
     let residuals = objective.residuals(&with).ok()?;
-    if !residuals.values.iter().all(|v| v.is_finite()) {
+    if !residuals.is_finite() {
         return None;
     }
     let there = basis.without(&rows(objective, &residuals));

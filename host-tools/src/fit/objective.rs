@@ -128,6 +128,14 @@ pub struct Residuals {
     pub values: Vec<f64>,
 }
 
+impl Residuals {
+    /// Whether every value is a number.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.values.iter().all(|value| value.is_finite())
+    }
+}
+
 impl Objective {
     /// Prepares recordings, which are taken to follow one another in the order given, held-out ones last: an effect with an
     /// onset stays. With `split`, stretches of every recording are held out in turn; without it the recordings
@@ -174,12 +182,14 @@ impl Objective {
         Ok(Self { datasets, scales, noise_variances, free_offsets: model.free_offsets.clone() })
     }
 
-    /// The recordings of which anything is fitted to; they come first, so their residuals are the first ones of all.
+    /// The recordings of which anything is fitted to, and those that only judge. The residuals of all are those of the
+    /// first followed by those of the others.
     #[must_use]
-    pub fn fitted(&self) -> Self {
+    pub fn split(&self) -> [Self; 2] {
         let fitted = |dataset: &Dataset| dataset.blocks.iter().any(|block| block.part == Part::Training);
         let count = self.datasets.iter().take_while(|dataset| fitted(dataset)).count();
-        Self { datasets: self.datasets[..count].to_vec(), ..self.clone() }
+        let (fitted, judging) = self.datasets.split_at(count);
+        [fitted, judging].map(|datasets| Self { datasets: datasets.to_vec(), ..self.clone() })
     }
 
     /// The same recordings with every sample used for fitting.

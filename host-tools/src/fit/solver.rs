@@ -54,7 +54,7 @@ impl Problem<'_> {
     }
 
     fn residuals_at(&self, x: &DVector<f64>) -> Option<Residuals> {
-        self.objective.residuals(&self.model_at(x)).ok().filter(|r| r.values.iter().all(|v| v.is_finite()))
+        self.objective.residuals(&self.model_at(x)).ok().filter(Residuals::is_finite)
     }
 
     /// Column `j` of `known`, whose rows end with the priors of its own parameters.
@@ -180,9 +180,11 @@ pub fn solve_with_slopes(
     rounds: &[f64],
     known: Option<&DMatrix<f64>>,
 ) -> Result<Solution, Failure> {
-    // Checks once that the model can be simulated at all; inside the optimiser an error could not be told.
-    let start = objective.residuals(model)?;
+    let [objective, judging] = &objective.split();
+    // Inside the optimiser an error could not be told.
+    let mut start = objective.residuals(model)?;
     if free.is_empty() {
+        start.values.extend(judging.residuals(model)?.values);
         return Ok(Solution {
             model: model.clone(),
             values: Vec::new(),
@@ -191,14 +193,23 @@ pub fn solve_with_slopes(
             jacobian: DMatrix::zeros(0, 0),
         });
     }
-    let everything = objective;
-    let objective = &objective.fitted();
+    let mut at_start = Some(start).filter(Residuals::is_finite);
     let mut fixed = vec![false; free.len()];
     let mut x = DVector::zeros(free.len());
     for (round, &step) in rounds.iter().enumerate() {
-        let mut problem =
-            Problem { objective, model, free, fixed: &fixed, step, known, x: x.clone(), current: None };
-        problem.set_params(&x);
+        let mut problem = Problem {
+            objective,
+            model,
+            free,
+            fixed: &fixed,
+            step,
+            known,
+            x: x.clone(),
+            current: at_start.take(),
+        };
+        if round > 0 {
+            problem.set_params(&x);
+        }
         // Farther than this the difference quotients do not lead.
         let tolerance = if step >= COARSE_STEP { 3e-3 } else { 1e-4 };
         let optimiser = LevenbergMarquardt::new()
@@ -246,7 +257,11 @@ pub fn solve_with_slopes(
         .map(|(std, (free, value))| std.map(|s| s * spread * free.slope_at(*value)))
         .collect();
     let model = problem.model_at(&x);
-    let residuals = everything.residuals(&model)?;
+    let mut residuals = match problem.current.take() {
+        Some(residuals) => residuals,
+        None => objective.residuals(&model)?,
+    };
+    residuals.values.extend(judging.residuals(&model)?.values);
     Ok(Solution { model, values, stds, residuals, jacobian })
 }
 

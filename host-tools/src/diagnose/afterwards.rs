@@ -1,0 +1,65 @@
+//! The bench after its recordings: what happened at a moment has happened, what has passed is gone, and a drift goes on
+//! from where it is.
+
+use crate::joint_model::JointModel;
+
+/// `model` after `clock_s` seconds of recordings. The first `own` effects are the rig's and stay as it states them.
+pub(super) fn afterwards(model: &JointModel, own: usize, clock_s: f64) -> JointModel {
+    let mut now = model.clone();
+    let found = now.effects.split_off(own);
+    for effect in found {
+        match effect.descriptor().id {
+            "wrap_angle_disturbed" if effect.parameters[1] + effect.parameters[2] < clock_s => {}
+            "friction_drift" => {
+                let drifted = (1.0 + effect.parameters[0] * clock_s).max(0.0);
+                if let Some(sheath) = &mut now.parameters.sheath {
+                    sheath.friction_coefficient *= drifted;
+                }
+                now.effects.push(effect.with("rate_per_s", effect.parameters[0] / drifted.max(1e-3)));
+            }
+            _ => now.effects.push(effect.with("time_s", 0.0)),
+        }
+    }
+    now
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::effect::ActiveEffect;
+    use bowden_model::effects::find;
+
+    use super::*;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+
+    fn after(clock_s: f64, effects: &[ActiveEffect]) -> JointModel {
+        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
+        let recording = Recording::new("any", vec![0.0, 1.0])
+            .with(bowden_model::channel::Channel::ThetaIn, vec![0.0, 0.0]);
+        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        afterwards(&JointModel { effects: effects.to_vec(), ..model }, 0, clock_s)
+    }
+
+    fn effect(id: &str) -> ActiveEffect {
+        ActiveEffect::with_defaults(find(id).unwrap())
+    }
+
+    /// 0.12 that falls by a hundredth a second for 20 s is 0.096; what falls on by the same amount is a larger share of that.
+    #[test]
+    fn a_drift_goes_on_from_where_it_is() {
+        let now = after(20.0, &[effect("friction_drift").with("rate_per_s", -0.01)]);
+        let friction = now.parameters.sheath.unwrap().friction_coefficient;
+        assert!((friction - 0.096).abs() < 1e-12, "{friction}");
+        let rate = now.effects[0].parameters[0];
+        assert!((rate * friction - -0.01 * 0.12).abs() < 1e-12, "{rate}");
+    }
+
+    #[test]
+    fn a_moment_has_been_and_a_disturbance_passes() {
+        let lost = after(20.0, &[effect("pretension_loss").with("time_s", 12.0)]);
+        assert_eq!(lost.effects, [effect("pretension_loss").with("time_s", 0.0)]);
+        let disturbed = effect("wrap_angle_disturbed").with("start_s", 5.0).with("duration_s", 4.0);
+        assert_eq!(after(20.0, &[disturbed]).effects, []);
+        assert_eq!(after(8.0, &[disturbed]).effects, [disturbed]);
+    }
+}
