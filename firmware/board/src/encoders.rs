@@ -7,8 +7,9 @@
 //! | timer | AMT22: second byte | its time, and 3.5 us |
 //! | timer | deselect, publish | |
 //!
-//! The waits are a timer's, the bytes are moved by DMA: 26 us with two AMT22, 44 us with two AS5045, 54 us with one of
-//! each, of which the core works less than 5 us. At 20 kHz the mixed pair gives a new frame every second tick only.
+//! The waits are a timer's, the bytes are moved by DMA. The timer's interrupt ranks below the tick: its first step comes when
+//! the tick has ended, so that a frame takes the length of a tick more than its own pauses and bytes. An AS5045 clocks
+//! three bytes at half the rate; at 20 kHz it, and an AMT22 beside it, give a new frame every second tick only.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
