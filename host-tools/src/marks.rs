@@ -4,8 +4,14 @@
 //! fitted to the others, and the left-out one is replayed. The physics itself was chosen by people who had seen all
 //! recordings; `docs/real-recordings.md` says how far that reaches.
 
+pub mod band_damper;
 pub mod cable_tool;
+pub mod cogging_motor;
+pub mod diagnosed;
+pub mod direct_drive;
 pub mod joint_fit;
+pub mod late;
+pub mod page;
 pub mod servo_pendulum;
 mod table;
 
@@ -78,4 +84,32 @@ pub fn listed_recordings(folder: &std::path::Path) -> Result<Vec<String>, Failur
     }
     names.sort_unstable();
     if names.is_empty() { Err(unusable("lists no recordings".to_owned())) } else { Ok(names) }
+}
+
+/// Columns of a table of numbers, in the order of `names`.
+///
+/// # Errors
+/// When the file cannot be read, lacks a column, or holds something else than a number there.
+pub fn columns<const N: usize>(path: &std::path::Path, names: [&str; N]) -> Result<[Vec<f64>; N], Failure> {
+    let unusable = |reason: String| {
+        Failure::bad_input(format!("{}: {reason}; name the folder that holds the data sets", path.display()))
+    };
+    let mut reader = csv::Reader::from_path(path).map_err(|error| unusable(error.to_string()))?;
+    let header = reader.headers().map_err(|error| unusable(error.to_string()))?.clone();
+    let mut places = [0; N];
+    for (place, name) in places.iter_mut().zip(names) {
+        *place = header
+            .iter()
+            .position(|there| there == name)
+            .ok_or_else(|| unusable(format!("no column `{name}`")))?;
+    }
+    let mut columns = [const { Vec::new() }; N];
+    for (number, row) in reader.records().enumerate() {
+        let row = row.map_err(|error| unusable(error.to_string()))?;
+        for ((column, place), name) in columns.iter_mut().zip(places).zip(names) {
+            let value = row.get(place).and_then(|cell| cell.parse().ok());
+            column.push(value.ok_or_else(|| unusable(format!("line {}: {name}: no number", number + 2)))?);
+        }
+    }
+    Ok(columns)
 }

@@ -356,3 +356,20 @@ pub fn leave_out<K: PartialEq + Sync>(
     models.sort_by_key(|(index, _)| *index);
     Ok(models.into_iter().map(|(_, model)| model).collect())
 }
+
+/// Joint of a run after a fit of `knobs` to that run alone, everything else as in `model`: what belongs to a mounting
+/// and no other recording can tell.
+///
+/// # Errors
+/// When the model cannot be driven.
+pub fn adapted(
+    run: &Run,
+    model: &JointModel,
+    knobs: impl Fn(&JointModel) -> Vec<Knob>,
+    steps: &[f64],
+    patience: usize,
+) -> Result<JointModel, Failure> {
+    let run = Run { model: model.clone(), ..run.clone() };
+    let knobs = knobs(&run.model);
+    Ok(fit(&[&run], &knobs, None, steps, patience)?.model(&run, &knobs))
+}

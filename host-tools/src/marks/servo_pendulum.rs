@@ -7,6 +7,7 @@ use std::path::Path;
 
 use bowden_model::channel::Channel;
 
+use super::diagnosed::Case;
 use super::joint_fit::{Compared, Knob, Run, fit, leave_out};
 use super::{Mark, Table, listed_recordings, mean};
 use crate::joint_model::JointModel;
@@ -17,8 +18,8 @@ use crate::simulation::ReplayInput;
 /// Folder of the data set.
 pub const FOLDER: &str = "bam-xl330-pendulum";
 
-/// Largest mean absolute angle error of recordings held out, rad.
-pub const LIMIT_RAD: f64 = 0.045;
+/// Largest mean absolute angle error of recordings held out, rad: an earlier quick fit.
+pub const LIMIT_RAD: f64 = 0.0399;
 
 /// Firmware gain and rig; the files differ in name and gain only.
 const RIGS: [(&str, &str); 4] = [
@@ -273,6 +274,16 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
         table.row([name, format!("{value:.4e}")]);
     }
     print(table.to_string());
+
+    let (gain, text) = RIGS[2];
+    let rig = format!("xl330-{gain}.toml");
+    let case = Case {
+        rig: &rig,
+        text,
+        training: vec!["xl330_kp400_lift_and_drop_10h29m21", "xl330_kp400_sin_sin_10h29m14"],
+        heldout: vec!["xl330_kp400_sin_time_square_10h29m37"],
+    };
+    case.print(&data.join(FOLDER), &mut print)?;
     Ok(vec![Mark {
         quantity: "servo pendulum, mean absolute angle error held out by recording, rad",
         score: mean(all.iter().copied()),

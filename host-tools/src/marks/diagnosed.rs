@@ -1,0 +1,93 @@
+//! What a diagnosis says about recordings of a real bench, in a few lines.
+
+use std::path::{Path, PathBuf};
+
+use super::Table;
+use crate::diagnose::diagnose;
+use crate::diagnose::verdict::Diagnosis;
+use crate::outcome::Failure;
+use crate::progress::Progress;
+use crate::recording::Recording;
+use crate::rig::Rig;
+
+/// A diagnosis that is to be made: what `bowden diagnose` is given.
+#[derive(Clone, Debug)]
+pub struct Case<'a> {
+    /// Name of the rig file in `rigs/`.
+    pub rig: &'a str,
+    /// Its text.
+    pub text: &'a str,
+    /// Recordings without `.csv`, in the folder of the data set.
+    pub training: Vec<&'a str>,
+    /// Recordings that judge; none holds out every third second.
+    pub heldout: Vec<&'a str>,
+}
+
+struct Silent;
+
+impl Progress for Silent {
+    fn stage(&self, _name: &str, _steps: u64) {}
+    fn advance(&self, _steps: u64) {}
+}
+
+impl Case<'_> {
+    /// The command that makes the same diagnosis, without its output folder.
+    #[must_use]
+    pub fn command(&self) -> String {
+        let mut words = vec![format!("bowden diagnose --rig rigs/{}", self.rig)];
+        words.extend(self.training.iter().map(|name| format!("{name}.csv")));
+        words.extend((!self.heldout.is_empty()).then(|| "--heldout".to_owned()));
+        words.extend(self.heldout.iter().map(|name| format!("{name}.csv")));
+        words.join(" ")
+    }
+
+    /// Makes the diagnosis.
+    ///
+    /// # Errors
+    /// When a file is missing or cannot be used with the rig.
+    pub fn diagnose(&self, folder: &Path) -> Result<Diagnosis, Failure> {
+        let rig = Rig::parse(self.text, &format!("rigs/{}", self.rig))?;
+        let load = |names: &[&str]| -> Result<Vec<Recording>, Failure> {
+            let paths = names.iter().map(|name| folder.join(format!("{name}.csv")));
+            paths.map(|path: PathBuf| rig.load_recording(&path)).collect()
+        };
+        let (training, heldout) = (load(&self.training)?, load(&self.heldout)?);
+        Ok(diagnose(&rig, &training, &heldout, &[], &Silent)?.findings.diagnosis)
+    }
+
+    /// Makes the diagnosis and writes command, verdict, named physics and held-out errors.
+    ///
+    /// # Errors
+    /// See [`Self::diagnose`].
+    pub fn print(&self, folder: &Path, print: &mut impl FnMut(String)) -> Result<Diagnosis, Failure> {
+        let diagnosis = self.diagnose(folder)?;
+        print(format!("{}\n{}", self.command(), said(&diagnosis)));
+        Ok(diagnosis)
+    }
+}
+
+/// Verdict, named physics and held-out errors of a diagnosis.
+#[must_use]
+pub fn said(diagnosis: &Diagnosis) -> String {
+    let mut lines = vec![format!("  {}", diagnosis.summary)];
+    for effect in &diagnosis.effects {
+        let on = effect.channel.as_ref().map_or(String::new(), |channel| format!(" on {channel}"));
+        let values: Vec<String> =
+            effect.parameters.iter().map(|(name, value)| format!("{name} {:.4}", value.value)).collect();
+        lines.push(format!(
+            "  named: {}{on}, probability {:.2}, {}",
+            effect.id,
+            effect.probability,
+            values.join(", ")
+        ));
+    }
+    if let Some(unexplained) = &diagnosis.unexplained {
+        lines.push(format!("  unexplained: {}", unexplained.sentence));
+    }
+    let mut table = Table::new(&["held out, root mean square", "rig as given", "recalibrated", "diagnosed"]);
+    for (channel, fit) in &diagnosis.fit.channels {
+        let values = [fit.before_rmse, fit.recalibrated_rmse, fit.after_rmse];
+        table.row([channel.clone()].into_iter().chain(values.map(|value| format!("{value:.4}"))));
+    }
+    format!("{}\n{table}", lines.join("\n"))
+}

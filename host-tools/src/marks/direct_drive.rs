@@ -1,0 +1,293 @@
+//! A rigid pendulum on a quasi-direct drive, simulated from the torque that its actuator reports.
+//!
+//! Two recordings of different weights. Dry and viscous friction come from the other recording; weight and arm, which
+//! the source does not state, are fitted to the recording itself and to nothing else. The pendulum is simulated from
+//! its reported torque alone, open loop from the first sample to the last.
+
+use std::path::Path;
+
+use bowden_model::channel::Channel;
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effects::find;
+use bowden_model::plant::GRAVITY_M_S2;
+use rayon::prelude::*;
+
+use super::diagnosed::Case;
+use super::joint_fit::{Compared, Knob, Run, adapted, fit};
+use super::{Mark, Table, columns, listed_recordings, mean, root_mean_square};
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
+use crate::rig::Rig;
+use crate::simulation::ReplayInput;
+
+/// Folder of the data set.
+pub const FOLDER: &str = "dfki-qdd-pendulum";
+
+/// Largest error of the angle, root mean square over both recordings, friction held out, rad.
+pub const LIMIT_RAD: f64 = 0.06;
+
+const RIG: (&str, &str) = ("dfki-qdd-pendulum.toml", include_str!("../../rigs/dfki-qdd-pendulum.toml"));
+
+/// Swing-up along a planned trajectory, 500 Hz.
+pub const SWING_UP: &str = "ddp";
+
+/// Motion under a position loop, 300 Hz.
+pub const POSITION_LOOP: &str = "pd__system_identification";
+
+/// Friction of the mark: the one that both recordings agree on.
+pub const MARKED: Physics = Physics::Dry;
+
+/// Angle error that counts as 1 in the fit, rad.
+const SCALE_RAD: f64 = 0.05;
+
+/// Difference steps of the fit.
+const STEPS: [f64; 2] = [0.03, 0.005];
+
+/// Evaluations per coordinate and round.
+const PATIENCE: usize = 12;
+
+/// Torque beyond which a sample counts as a spike, N·m; the swing-up stays below.
+const SPIKE_NM: f64 = 5.0;
+
+/// The friction that is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Physics {
+    /// Inertia and weight alone.
+    Frictionless,
+    /// Viscous friction.
+    Viscous,
+    /// Dry friction.
+    Dry,
+    /// Both.
+    DryAndViscous,
+}
+
+impl Physics {
+    /// All, in the order of a table.
+    pub const ALL: [Self; 4] = [Self::Frictionless, Self::Viscous, Self::Dry, Self::DryAndViscous];
+
+    /// Name in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Frictionless => "inertia and weight alone",
+            Self::Viscous => "viscous friction",
+            Self::Dry => "dry friction",
+            Self::DryAndViscous => "dry and viscous friction",
+        }
+    }
+
+    /// Round guesses from which every fit starts.
+    fn prepare(self, model: &mut JointModel) {
+        if let Some(load) = &mut model.parameters.load
+            && matches!(self, Self::Viscous | Self::DryAndViscous)
+        {
+            load.viscous_nm_s_per_rad = 0.02;
+        }
+        if matches!(self, Self::Dry | Self::DryAndViscous)
+            && let Some(effect) = find("joint_coulomb_friction")
+        {
+            model.effects.push(ActiveEffect::with_defaults(effect).with("torque_nm", 0.1));
+        }
+    }
+
+    fn friction(self, model: &JointModel) -> Vec<Knob> {
+        let viscous = Knob::nominal(model, "load", "viscous_nm_s_per_rad");
+        let dry = Knob::effect(model, "joint_coulomb_friction", "torque_nm");
+        viscous
+            .filter(|_| matches!(self, Self::Viscous | Self::DryAndViscous))
+            .into_iter()
+            .chain(dry)
+            .collect()
+    }
+}
+
+/// Weight and arm.
+fn pendulum(model: &JointModel) -> Vec<Knob> {
+    ["mass_kg", "arm_m"].into_iter().filter_map(|name| Knob::nominal(model, "load", name)).collect()
+}
+
+/// The recordings, prepared; the joints are as the rig states them.
+///
+/// # Errors
+/// When a file of the data set is missing or unusable.
+pub fn load(data: &Path) -> Result<Vec<Run>, Failure> {
+    let folder = data.join(FOLDER);
+    let rig = Rig::parse(RIG.1, &format!("rigs/{}", RIG.0))?;
+    listed_recordings(&folder)?
+        .into_iter()
+        .enumerate()
+        .map(|(group, name)| {
+            let recording = rig.load_recording(&folder.join(format!("{name}.csv")))?;
+            let model = JointModel::from_rig(&rig, &recording)?;
+            let mut input = ReplayInput::new(&model, &recording)?;
+            let measured = recording.channel(Channel::ThetaOut).unwrap_or_default().to_vec();
+            input.start_at(measured[0], 0.0);
+            let compared = vec![Compared {
+                channel: Channel::ThetaOut,
+                measured,
+                scale: SCALE_RAD,
+                from: 0,
+                free_offset: false,
+            }];
+            Ok(Run { name, group, model, input, compared })
+        })
+        .collect()
+}
+
+/// What the other recordings may tell about one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taken {
+    /// Friction; weight and arm are fitted to the recording itself.
+    Friction,
+    /// Everything.
+    Everything,
+    /// Nothing: all is fitted to the recording itself, which then is not held out.
+    Nothing,
+}
+
+/// Joint of every run.
+///
+/// # Errors
+/// When a model cannot be driven.
+pub fn models(runs: &[Run], physics: Physics, taken: Taken) -> Result<Vec<JointModel>, Failure> {
+    let mut runs = runs.to_vec();
+    for run in &mut runs {
+        physics.prepare(&mut run.model);
+    }
+    let all = |model: &JointModel| -> Vec<Knob> {
+        pendulum(model).into_iter().chain(physics.friction(model)).collect()
+    };
+    let fitted = |run: &Run| -> Result<JointModel, Failure> {
+        let of_itself = taken == Taken::Nothing;
+        let training: Vec<&Run> =
+            runs.iter().filter(|other| (other.group == run.group) == of_itself).collect();
+        let knobs = all(&run.model);
+        let model = fit(&training, &knobs, None, &STEPS, PATIENCE)?.model(run, &knobs);
+        if taken == Taken::Friction { adapted(run, &model, pendulum, &STEPS, PATIENCE) } else { Ok(model) }
+    };
+    runs.par_iter().map(fitted).collect()
+}
+
+/// Angle errors of all runs, root mean square, rad.
+///
+/// # Errors
+/// When a model cannot be driven.
+pub fn errors_rad(runs: &[Run], models: &[JointModel]) -> Result<Vec<f64>, Failure> {
+    runs.iter()
+        .zip(models)
+        .map(|(run, model)| Ok(root_mean_square(run.differences(model)?.concat())))
+        .collect()
+}
+
+/// What a recording shows of itself, without any model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// Largest reported torque, N·m.
+    pub largest_nm: f64,
+    /// Share of the samples beyond [`SPIKE_NM`].
+    pub spikes: f64,
+    /// Share of the torque's time integral, sign left out, in those samples.
+    pub spike_share: f64,
+    /// Reported speed against the slope of the angle, root mean square, rad/s.
+    pub speed_rad_s: f64,
+}
+
+/// What the recordings show of themselves, in the order of [`load`].
+///
+/// # Errors
+/// When a file of the data set is missing or unusable.
+pub fn shown(data: &Path) -> Result<Vec<Shown>, Failure> {
+    let folder = data.join(FOLDER);
+    let names = ["time_s", "angle_rad", "velocity_rad_s", "motor_torque_nm"];
+    let of = |name: String| -> Result<Shown, Failure> {
+        let [t_s, angle_rad, speed_rad_s, torque_nm] = columns(&folder.join(format!("{name}.csv")), names)?;
+        let size = |values: &[f64]| values.iter().fold(0.0, |sum, value| sum + value.abs());
+        let spikes: Vec<f64> = torque_nm.iter().copied().filter(|torque| torque.abs() > SPIKE_NM).collect();
+        let apart = (5..t_s.len() - 5).map(|k| {
+            let slope_rad_s = (angle_rad[k + 5] - angle_rad[k - 5]) / (t_s[k + 5] - t_s[k - 5]);
+            mean(speed_rad_s[k - 5..=k + 5].iter().copied()) - slope_rad_s
+        });
+        Ok(Shown {
+            largest_nm: torque_nm.iter().fold(0.0, |largest: f64, torque| largest.max(torque.abs())),
+            spikes: spikes.len() as f64 / t_s.len() as f64,
+            spike_share: size(&spikes) / size(&torque_nm),
+            speed_rad_s: root_mean_square(apart),
+        })
+    };
+    listed_recordings(&folder)?.into_iter().map(of).collect()
+}
+
+/// Writes the tables and returns the mark.
+///
+/// # Errors
+/// When the data set is missing or a model cannot be driven.
+pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, Failure> {
+    let runs = load(data)?;
+    print(format!(
+        "Quasi-direct-drive pendulum ({FOLDER}): angle error, rad, root mean square, simulated from the reported torque\n"
+    ));
+    let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+    let header =
+        ["weight and arm own, friction from the other recording"].into_iter().chain(names.iter().copied());
+    let mut table = Table::new(&header.collect::<Vec<_>>());
+    let cells = |errors: &[f64]| errors.iter().map(|error| format!("{error:.4}")).collect::<Vec<_>>();
+    let mut held_out = f64::NAN;
+    for physics in Physics::ALL {
+        let errors = errors_rad(&runs, &models(&runs, physics, Taken::Friction)?)?;
+        table.row([physics.name().to_owned()].into_iter().chain(cells(&errors)));
+        if physics == MARKED {
+            held_out = root_mean_square(errors);
+        }
+    }
+    for (words, taken) in [
+        ("dry and viscous, everything from the other", Taken::Everything),
+        ("dry and viscous, everything own (not held out)", Taken::Nothing),
+    ] {
+        let errors = errors_rad(&runs, &models(&runs, Physics::DryAndViscous, taken)?)?;
+        table.row([words.to_owned()].into_iter().chain(cells(&errors)));
+    }
+    print(table.to_string());
+
+    let own = models(&runs, Physics::DryAndViscous, Taken::Nothing)?;
+    let mut table =
+        Table::new(&["fitted to itself", "mass kg", "arm m", "weight N m", "viscous N m s/rad", "dry N m"]);
+    for (run, model) in runs.iter().zip(&own) {
+        let Some(load) = model.parameters.load else { continue };
+        let dry_nm = model.effects.first().map_or(0.0, |effect| effect.parameters[0]);
+        let weight_nm = load.mass_kg * GRAVITY_M_S2 * load.arm_m;
+        let values = [load.mass_kg, load.arm_m, weight_nm, load.viscous_nm_s_per_rad, dry_nm];
+        table.row([run.name.clone()].into_iter().chain(values.map(|value| format!("{value:.4}"))));
+    }
+    table.row(["published, run not named", "", "", "", "0.0471", "0.1839"].map(str::to_owned));
+    print(table.to_string());
+
+    let mut table = Table::new(&[
+        "recording",
+        "largest torque N m",
+        "samples beyond 5 N m",
+        "their share of the torque",
+        "speed against slope of angle rad/s",
+    ]);
+    for (name, shown) in names.iter().zip(shown(data)?) {
+        table.row([
+            (*name).to_owned(),
+            format!("{:.1}", shown.largest_nm),
+            format!("{:.1} %", 100.0 * shown.spikes),
+            format!("{:.0} %", 100.0 * shown.spike_share),
+            format!("{:.3}", shown.speed_rad_s),
+        ]);
+    }
+    print(table.to_string());
+
+    for (training, heldout) in [(SWING_UP, vec![]), (POSITION_LOOP, vec![]), (SWING_UP, vec![POSITION_LOOP])]
+    {
+        let case = Case { rig: RIG.0, text: RIG.1, training: vec![training], heldout };
+        case.print(&data.join(FOLDER), &mut print)?;
+    }
+    Ok(vec![Mark {
+        quantity: "quasi-direct drive, angle simulated from torque, friction from the other recording, rad",
+        score: held_out,
+        limit: LIMIT_RAD,
+    }])
+}
