@@ -2,10 +2,12 @@
 //!
 //! A [`plan`] says which rigs; [`run`] draws one, writes its files and lets the binary work on them; the [`outcome`] is
 //! kept as a line of JSON; [`score`] and [`summary`] judge it against the [`truth`], and [`page`] prints that.
+//! [`rivals`] are other tools on the same files.
 
 pub mod outcome;
 pub mod page;
 pub mod plan;
+pub mod rivals;
 pub mod run;
 pub mod score;
 pub mod summary;

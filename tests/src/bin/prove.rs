@@ -11,6 +11,7 @@ use std::thread;
 use bowden_tests::prove::outcome::{Log, Outcome};
 use bowden_tests::prove::page::{Provenance, render};
 use bowden_tests::prove::plan::{Group, Plan, plans, quick_sample};
+use bowden_tests::prove::rivals::{RivalOutcome, Rivals};
 use bowden_tests::prove::run::{key, run};
 use bowden_tests::prove::score::{concealed_shortly, said_shortly, score};
 use bowden_tests::prove::summary::Summary;
@@ -48,6 +49,8 @@ struct Options {
     strict: bool,
     #[command(flatten)]
     show: Show,
+    #[command(flatten)]
+    others: Others,
     /// The binary to prove
     #[arg(long, value_name = "FILE", default_value = "target/release/bowden")]
     bowden: PathBuf,
@@ -68,6 +71,30 @@ struct Show {
     /// Run nothing: print what has been done so far with this binary
     #[arg(long)]
     so_far: bool,
+}
+
+/// Other tools on the same files.
+#[derive(Debug, Args)]
+struct Others {
+    /// Run other tools on the files of a sample of the cases as well, the one of --quick; tests/rivals/install gets them
+    #[arg(long)]
+    rivals: bool,
+    /// Python environment of the rivals, by default the folder `rivals` in cargo's target folder
+    #[arg(long, value_name = "DIR")]
+    venv: Option<PathBuf>,
+}
+
+impl Others {
+    /// `None` where nobody asks for them.
+    fn open(&self) -> Result<Option<Rivals>, String> {
+        if !self.rivals {
+            return Ok(None);
+        }
+        let here = std::env::current_exe().map_err(|error| format!("this program's own path: {error}"))?;
+        let target = here.ancestors().nth(2).unwrap_or(&here);
+        let venv = self.venv.clone().unwrap_or_else(|| target.join("rivals"));
+        Rivals::new(&venv, &Path::new(env!("CARGO_MANIFEST_DIR")).join("rivals")).map(Some)
+    }
 }
 
 fn main() -> ExitCode {
@@ -91,6 +118,7 @@ fn prove(options: &Options) -> Result<bool, String> {
         }
         return Ok(true);
     }
+    let rivals = options.others.open()?;
     let folder = options.out.as_deref().unwrap_or(&options.results);
     fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let folder = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
@@ -100,8 +128,12 @@ fn prove(options: &Options) -> Result<bool, String> {
     let threads = (processors / jobs).max(1);
     let tool = Tool::new(&bowden, threads)?;
     let log = Log::open(&folder.join("results.jsonl"))?;
-    let work = Work { tool: &tool, log: &log, options, folder: &folder };
-    let outcomes = work.all(&plans, jobs)?;
+    let rivals = match rivals {
+        Some(rivals) => Some((rivals, Log::open(&folder.join("rivals.jsonl"))?)),
+        None => None,
+    };
+    let work = Work { tool: &tool, log: &log, rivals: rivals.as_ref(), options, folder: &folder };
+    let (outcomes, rival_outcomes) = work.all(&plans, jobs)?;
 
     let complete = outcomes.len() == plans.len();
     let summary = Summary::of(outcomes);
@@ -114,7 +146,7 @@ fn prove(options: &Options) -> Result<bool, String> {
         jobs,
         seed: options.seed,
     };
-    let page = render(&summary, &provenance);
+    let page = render(&summary, &rival_outcomes, &provenance);
     println!("\n{page}");
     if let Some(proof) = &options.proof
         && complete
@@ -149,23 +181,25 @@ fn chosen(options: &Options) -> Result<Vec<Plan>, String> {
 struct Work<'a> {
     tool: &'a Tool,
     log: &'a Log,
+    rivals: Option<&'a (Rivals, Log<RivalOutcome>)>,
     options: &'a Options,
     folder: &'a Path,
 }
 
 impl Work<'_> {
-    /// Every case that is done or can be done, in the order of the plans.
-    fn all(&self, plans: &[Plan], jobs: usize) -> Result<Vec<Outcome>, String> {
+    /// Every case that is done or can be done, in the order of the plans, and the rivals on a sample of them.
+    fn all(&self, plans: &[Plan], jobs: usize) -> Result<(Vec<Outcome>, Vec<RivalOutcome>), String> {
         let next = AtomicUsize::new(0);
         let done = Mutex::new(Vec::new());
+        let sample = quick_sample(plans.to_vec());
         let work = || -> Result<(), String> {
             loop {
                 let place = next.fetch_add(1, Ordering::Relaxed);
                 let Some(plan) = plans.get(place) else { return Ok(()) };
-                if let Some(outcome) = self.one(plan)? {
-                    println!("[{:>3}/{}] {}", place + 1, plans.len(), line(&outcome));
-                    done.lock().unwrap_or_else(PoisonError::into_inner).push((place, outcome));
-                }
+                let Some(outcome) = self.one(plan)? else { continue };
+                println!("[{:>3}/{}] {}", place + 1, plans.len(), line(&outcome));
+                let others = if sample.contains(plan) { self.others(plan)? } else { Vec::new() };
+                done.lock().unwrap_or_else(PoisonError::into_inner).push((place, outcome, others));
             }
         };
         thread::scope(|scope| {
@@ -176,8 +210,31 @@ impl Work<'_> {
             ends.collect::<Result<Vec<()>, String>>()
         })?;
         let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-        done.sort_by_key(|(place, _)| *place);
-        Ok(done.into_iter().map(|(_, outcome)| outcome).collect())
+        done.sort_by_key(|(place, ..)| *place);
+        let (outcomes, others): (Vec<_>, Vec<_>) =
+            done.into_iter().map(|(_, outcome, others)| (outcome, others)).unzip();
+        Ok((outcomes, others.concat()))
+    }
+
+    /// The rivals on a case; without any, or where nothing shall be run, those that are done.
+    fn others(&self, plan: &Plan) -> Result<Vec<RivalOutcome>, String> {
+        let Some((rivals, log)) = self.rivals else { return Ok(Vec::new()) };
+        let case = plan.case().map_err(|error| format!("{}: {error}", plan.name))?;
+        let known = rivals.known(log, self.tool, plan, &case);
+        if self.options.show.so_far {
+            return Ok(known);
+        }
+        let done = if self.options.fresh { Vec::new() } else { known };
+        self.in_folder(plan, |folder| rivals.run(log, self.tool, (plan, &case), folder, done))
+    }
+
+    /// Does something in the folder of a case: one that is kept, or one that is gone afterwards.
+    fn in_folder<T>(&self, plan: &Plan, work: impl FnOnce(&Path) -> Result<T, String>) -> Result<T, String> {
+        if self.options.out.is_some() {
+            return work(&self.folder.join(plan.name.replace('/', "-")));
+        }
+        let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
+        work(folder.path())
     }
 
     /// `None` for a case that is not done yet where nothing shall be run.
@@ -190,12 +247,7 @@ impl Work<'_> {
         if let Some(known) = known.filter(|_| !self.options.fresh) {
             return Ok(Some(known.clone()));
         }
-        let outcome = if self.options.out.is_some() {
-            run(self.tool, plan, &case, &self.folder.join(plan.name.replace('/', "-")))?
-        } else {
-            let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
-            run(self.tool, plan, &case, folder.path())?
-        };
+        let outcome = self.in_folder(plan, |folder| run(self.tool, plan, &case, folder))?;
         self.log.append(&outcome)?;
         Ok(Some(outcome))
     }

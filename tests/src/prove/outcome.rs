@@ -131,14 +131,26 @@ pub struct Outcome {
     pub cost: Cost,
 }
 
-/// File of outcomes, one JSON line each, appended as they come.
-#[derive(Debug)]
-pub struct Log {
-    file: Mutex<File>,
-    known: Vec<Outcome>,
+/// What a [`Log`] keeps.
+pub trait Kept: Serialize + for<'de> Deserialize<'de> {
+    /// Whether it is the result of this name, made with the program and the case of this key.
+    fn is(&self, name: &str, key: &str) -> bool;
 }
 
-impl Log {
+impl Kept for Outcome {
+    fn is(&self, name: &str, key: &str) -> bool {
+        self.name == name && self.key == key
+    }
+}
+
+/// File of outcomes, one JSON line each, appended as they come.
+#[derive(Debug)]
+pub struct Log<T = Outcome> {
+    file: Mutex<File>,
+    known: Vec<T>,
+}
+
+impl<T: Kept> Log<T> {
     /// Opens or makes the file. A line that is no outcome, such as the half one of an interrupted run, is passed over.
     ///
     /// # Errors
@@ -160,18 +172,18 @@ impl Log {
         Ok(Self { file: Mutex::new(file), known })
     }
 
-    /// The last outcome of a case with this key.
+    /// The last outcome of this name with this key.
     #[must_use]
-    pub fn find(&self, name: &str, key: &str) -> Option<&Outcome> {
-        self.known.iter().rfind(|outcome| outcome.name == name && outcome.key == key)
+    pub fn find(&self, name: &str, key: &str) -> Option<&T> {
+        self.known.iter().rfind(|outcome| outcome.is(name, key))
     }
 
     /// Appends an outcome.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn append(&self, outcome: &Outcome) -> Result<(), String> {
-        let line = serde_json::to_string(outcome).map_err(|error| format!("{}: {error}", outcome.name))?;
+    pub fn append(&self, outcome: &T) -> Result<(), String> {
+        let line = serde_json::to_string(outcome).map_err(|error| format!("results: {error}"))?;
         let mut file = self.file.lock().map_err(|_| "the file of results is in use".to_owned())?;
         writeln!(file, "{line}").map_err(|error| format!("results: {error}"))
     }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use super::outcome::Outcome;
 use super::plan::{Group, noise_levels_n};
+use super::rivals::{RivalOutcome, table};
 use super::score::{Score, concealed_shortly, reason, said_shortly};
 use super::summary::{Rate, Summary, median, quantile};
 
@@ -27,16 +28,21 @@ pub struct Provenance {
     pub seed: u64,
 }
 
-/// Writes the whole page.
+/// Writes the whole page; a table of rivals where there are any.
 #[must_use]
-pub fn render(summary: &Summary, provenance: &Provenance) -> String {
+pub fn render(summary: &Summary, rivals: &[RivalOutcome], provenance: &Provenance) -> String {
     let mut page = String::new();
     // Writing to a string cannot fail.
-    let _ = write(&mut page, summary, provenance);
+    let _ = write(&mut page, summary, rivals, provenance);
     page
 }
 
-fn write(page: &mut String, summary: &Summary, provenance: &Provenance) -> std::fmt::Result {
+fn write(
+    page: &mut String,
+    summary: &Summary,
+    rivals: &[RivalOutcome],
+    provenance: &Provenance,
+) -> std::fmt::Result {
     let Provenance { date, commit, machine, tool, threads, jobs, seed } = provenance;
     let [quiet_n, noisy_n] = noise_levels_n();
     writeln!(page, "# Concealed effects, found or not\n")?;
@@ -64,6 +70,8 @@ fn write(page: &mut String, summary: &Summary, provenance: &Provenance) -> std::
         writeln!(page, "| {} | {} | {} | {met} |", goal.what, goal.found, goal.wanted)?;
     }
     groups(page, summary)?;
+    let outcomes: Vec<&Outcome> = summary.cases.iter().map(|(outcome, _)| outcome).collect();
+    page.push_str(&table(&outcomes, rivals));
     errors(page, summary)?;
     calibration(page, summary)?;
     by_effect(page, summary)?;
@@ -247,7 +255,7 @@ mod tests {
             outcome(Group::Single, &[spring], wrong),
             outcome(Group::Nothing, &[], diagnosis("consistent", &[])),
         ]);
-        let page = render(&summary, &provenance());
+        let page = render(&summary, &[], &provenance());
         for line in [
             "| date | 2026-01-02 |",
             "| single effects: first name right | 0 of 1 (0.0 %) | ≥ 95 % | **missed** |",
@@ -275,7 +283,7 @@ mod tests {
             diagnosis("consistent", &[]),
         )]);
         let mut cells = None;
-        for line in render(&summary, &provenance()).lines() {
+        for line in render(&summary, &[], &provenance()).lines() {
             if line.starts_with('|') {
                 let here = line.matches('|').count();
                 assert_eq!(*cells.get_or_insert(here), here, "{line}");

@@ -16,9 +16,15 @@ use super::truth::{HELDOUT_S, TRAINING_S, Truth, believed_rig, true_rig, true_ri
 /// Key of a result: the binary and everything that the case was drawn with.
 #[must_use]
 pub fn key(tool: &Tool, plan: &Plan, case: &Case) -> String {
+    format!("{:016x}-{}", tool.hash(), key_of_case(plan, case))
+}
+
+/// The part of the key that is the same for every program.
+#[must_use]
+pub fn key_of_case(plan: &Plan, case: &Case) -> String {
     let mut hasher = DefaultHasher::new();
     format!("{case:?} {}", plan.lumped).hash(&mut hasher);
-    format!("{:016x}-{:016x}", tool.hash(), hasher.finish())
+    format!("{:016x}", hasher.finish())
 }
 
 /// Runs one case in `folder`, which is made.
@@ -67,7 +73,10 @@ fn examine(tool: &Tool, folder: &Path, heldout: &Recording, outcome: &mut Outcom
 }
 
 /// Records the case and writes all its files; the held-out recording is returned.
-fn write_case(plan: &Plan, case: &Case, folder: &Path) -> Result<Recording, String> {
+///
+/// # Errors
+/// When the bench refuses the case or a file cannot be written.
+pub fn write_case(plan: &Plan, case: &Case, folder: &Path) -> Result<Recording, String> {
     let failed = |error: &dyn std::fmt::Display| format!("{}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(|error| failed(&error))?;
     let bench = |error: BenchError| format!("{}: {error}", plan.name);

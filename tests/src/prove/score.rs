@@ -121,7 +121,8 @@ fn parameter_errors((true_effect, effect): (&TrueEffect, &SaidEffect)) -> Vec<(S
 }
 
 /// Error over error, each channel by itself, root mean square over the channels that both have.
-fn ratio(of: &Errors, to: &Errors) -> Option<f64> {
+#[must_use]
+pub fn ratio(of: &Errors, to: &Errors) -> Option<f64> {
     let squares: Vec<f64> = of
         .iter()
         .filter_map(|(channel, error)| Some((error / to.get(channel)?).powi(2)))

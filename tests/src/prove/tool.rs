@@ -93,49 +93,70 @@ impl Tool {
         recorded: &virtual_bench::Recording,
     ) -> Result<Errors, String> {
         let predicted = "predicted.csv";
-        self.run(folder, &["replay", "inputs.csv", "--rig", rig, "--out", predicted])?;
+        self.replay_to(folder, "inputs.csv", rig, predicted)?;
         errors(&folder.join(predicted), recorded)
     }
 
-    fn run(&self, folder: &Path, arguments: &[&str]) -> Result<Cost, String> {
-        let said = folder.join("stderr.txt");
-        let stderr = File::create(&said).map_err(|error| format!("{}: {error}", said.display()))?;
-        let mut command = Command::new(&self.path);
-        command
-            .current_dir(folder)
-            .args(arguments)
-            .arg("--quiet")
-            .arg("--jobs")
-            .arg(self.threads.to_string());
-        let started = Instant::now();
-        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr).spawn();
-        let mut child =
-            child.map_err(|error| format!("{} cannot be started: {error}", self.path.display()))?;
-        let used = loop {
-            if let Some(used) = child.try_wait4().map_err(|error| format!("bowden: {error}"))? {
-                break used;
-            }
-            if started.elapsed() > LIMIT {
-                // Either it still runs and is ended here, or it has just ended by itself.
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(format!("bowden {} was not done after {} s", arguments[0], LIMIT.as_secs()));
-            }
-            thread::sleep(POLL);
-        };
-        // 3: done, but something was lost or repaired.
-        if !matches!(used.status.code(), Some(0 | 3)) {
-            let text = fs::read_to_string(&said).unwrap_or_default();
-            let last =
-                text.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("it says nothing");
-            return Err(format!("bowden {} ended with {}: {last}", arguments[0], used.status));
-        }
-        Ok(Cost {
-            seconds: started.elapsed().as_secs_f64(),
-            cpu_seconds: (used.rusage.utime + used.rusage.stime).as_secs_f64(),
-            peak_mb: used.rusage.maxrss as f64 / 1e6,
-        })
+    /// Recalibrates the nominal parameters to `train.csv` into a rig file of `folder`.
+    ///
+    /// # Errors
+    /// As [`Self::diagnose`].
+    pub fn fit(&self, folder: &Path, fitted: &str) -> Result<Cost, String> {
+        self.run(folder, &["fit", "train.csv", "--rig", "rig.toml", "--out", fitted])
     }
+
+    /// Replays any recording of `folder` into a file there.
+    ///
+    /// # Errors
+    /// As [`Self::diagnose`].
+    pub fn replay_to(&self, folder: &Path, recording: &str, rig: &str, out: &str) -> Result<Cost, String> {
+        self.run(folder, &["replay", recording, "--rig", rig, "--out", out])
+    }
+
+    fn run(&self, folder: &Path, arguments: &[&str]) -> Result<Cost, String> {
+        let mut command = Command::new(&self.path);
+        command.args(arguments).arg("--quiet").arg("--jobs").arg(self.threads.to_string());
+        // 3: done, but something was lost or repaired.
+        measured(&mut command, folder, &format!("bowden {}", arguments[0]), &[0, 3])
+    }
+}
+
+/// Runs a program in `folder` to its end and measures what it used; what it says goes to `stderr.txt`.
+///
+/// # Errors
+/// When it cannot be started, takes too long, or does not end with one of the accepted exit statuses; the reason is its
+/// last line.
+pub fn measured(command: &mut Command, folder: &Path, what: &str, accepted: &[i32]) -> Result<Cost, String> {
+    let said = folder.join("stderr.txt");
+    let stderr = File::create(&said).map_err(|error| format!("{}: {error}", said.display()))?;
+    command.current_dir(folder);
+    let started = Instant::now();
+    let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr).spawn();
+    let mut child = child.map_err(|error| {
+        format!("{} cannot be started: {error}", Path::new(command.get_program()).display())
+    })?;
+    let used = loop {
+        if let Some(used) = child.try_wait4().map_err(|error| format!("{what}: {error}"))? {
+            break used;
+        }
+        if started.elapsed() > LIMIT {
+            // Either it still runs and is ended here, or it has just ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(format!("{what} was not done after {} s", LIMIT.as_secs()));
+        }
+        thread::sleep(POLL);
+    };
+    if !used.status.code().is_some_and(|code| accepted.contains(&code)) {
+        let text = fs::read_to_string(&said).unwrap_or_default();
+        let last = text.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("it says nothing");
+        return Err(format!("{what} ended with {}: {last}", used.status));
+    }
+    Ok(Cost {
+        seconds: started.elapsed().as_secs_f64(),
+        cpu_seconds: (used.rusage.utime + used.rusage.stime).as_secs_f64(),
+        peak_mb: used.rusage.maxrss as f64 / 1e6,
+    })
 }
 
 /// Writes the columns of `recorded` that a replay may see.
@@ -154,7 +175,10 @@ pub fn write_inputs(path: &Path, recorded: &virtual_bench::Recording) -> Result<
 }
 
 /// Root mean square difference of every channel that `path` predicts.
-fn errors(path: &Path, recorded: &virtual_bench::Recording) -> Result<Errors, String> {
+///
+/// # Errors
+/// When the file cannot be read, or has not one row of numbers a recorded sample.
+pub fn errors(path: &Path, recorded: &virtual_bench::Recording) -> Result<Errors, String> {
     let shown = path.display();
     let mut reader = csv::Reader::from_path(path).map_err(|error| format!("{shown}: {error}"))?;
     let names = reader.headers().map_err(|error| format!("{shown}: {error}"))?.clone();
