@@ -10,7 +10,9 @@
 mod afterwards;
 mod candidates;
 mod experiment;
+mod layout;
 mod place;
+mod residual_map;
 mod screening;
 mod selection;
 mod unexplained;
@@ -21,7 +23,7 @@ use std::collections::BTreeMap;
 
 use bowden_model::effect::ActiveEffect;
 
-use crate::fit::free::{Free, Place, recalibrated};
+use crate::fit::free::{Place, recalibrated};
 use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::joint_model::JointModel;
@@ -33,13 +35,19 @@ use crate::simulation::Prediction;
 use afterwards::afterwards;
 pub use experiment::Experiment;
 use experiment::Shown;
-use selection::{Chosen, Selected, Tried, select};
+use layout::Layout;
+use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use verdict::{
-    ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, Recalibrated, SCHEMA, Trace, Verdict,
+    Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, Recalibrated, SCHEMA, SearchRound,
+    Trace, Verdict,
 };
 
-/// Contacts of each tendon while candidates are tried; the trapezoidal error of eight is below 0.2 % for every wrap.
-const SEARCH_ELEMENTS: usize = 8;
+/// Contacts of each tendon while candidates are tried: as many as keep the trapezoidal error `(μK)² / 12 n²` of its
+/// elongation below this, within the range below.
+const SEARCH_ERROR: f64 = 1e-3;
+
+/// Range of the number of contacts while candidates are tried.
+const SEARCH_ELEMENTS: std::ops::RangeInclusive<usize> = 4..=8;
 
 /// Simulation step while candidates are tried, s.
 const SEARCH_STEP_S: f64 = 1e-3;
@@ -79,7 +87,7 @@ impl Diagnosed {
 }
 
 /// Diagnoses `training`, and proves the result on `heldout`; without held-out recordings, stretches of the training
-/// recordings are held out.
+/// recordings are held out. Effects that are tried on request only are tried if they are among `asked`.
 ///
 /// # Errors
 /// When the recordings cannot drive the rig or hold nothing to compare.
@@ -87,6 +95,7 @@ pub fn diagnose(
     rig: &Rig,
     training: &[Recording],
     heldout: &[Recording],
+    asked: &[&str],
     progress: &dyn Progress,
 ) -> Result<Diagnosed, Failure> {
     let first =
@@ -94,23 +103,27 @@ pub fn diagnose(
     let model = JointModel::from_rig(rig, first)?;
     let objective = Objective::new(&model, training, heldout, heldout.is_empty())?;
     let search = JointModel {
-        elements: model.elements.min(SEARCH_ELEMENTS),
+        elements: model.elements.min(search_elements(&model)),
         step_s: model.step_s.max(SEARCH_STEP_S),
         ..model.clone()
     };
-    let selected = select(&objective, &search, progress)?;
-    let last = if selected.complete {
-        refine(&objective, &model, &selected, progress)?
-    } else {
-        let model = at_full_resolution(&selected.solution.model, &model);
-        Solution { model, ..selected.solution.clone() }
-    };
+    let selected = select(&objective, &search, asked, progress)?;
+    let last = refine(&objective, &model, &selected, progress)?;
     let before = objective.predict(&model)?;
     let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
     let after = objective.predict(&last.model)?;
-    let stages = Stages { before, recalibrated, after };
+    let searched = objective.predict(&selected.searched)?;
+    let stages = Stages { before, recalibrated, after, searched };
     Ok(Case { rig, training, heldout, objective: &objective, model: &model }
         .report(&selected, &last, &stages))
+}
+
+/// Contacts that are enough while candidates are tried.
+fn search_elements(model: &JointModel) -> usize {
+    let wrap_friction =
+        model.parameters.sheath.map_or(0.0, |sheath| sheath.friction_coefficient * sheath.wrap_angle_rad);
+    let enough = (wrap_friction / (12.0 * SEARCH_ERROR).sqrt()).ceil() as usize;
+    enough.clamp(*SEARCH_ELEMENTS.start(), *SEARCH_ELEMENTS.end())
 }
 
 /// What a diagnosis is about.
@@ -127,13 +140,16 @@ pub(crate) struct Stages {
     pub before: Vec<Prediction>,
     pub recalibrated: Vec<Prediction>,
     pub after: Vec<Prediction>,
+    /// With the diagnosed physics and an ordinary contact, at the resolution of the search.
+    pub searched: Vec<Prediction>,
 }
 
 fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
     JointModel { elements: model.elements, step_s: model.step_s, ..searched.clone() }
 }
 
-/// Fits the chosen physics at the rig's own resolution to all data that may be fitted.
+/// Fits the chosen physics at the rig's own resolution to all data that may be fitted; after Ctrl-C only its standard
+/// deviations are still found.
 fn refine(
     objective: &Objective,
     model: &JointModel,
@@ -141,12 +157,10 @@ fn refine(
     progress: &dyn Progress,
 ) -> Result<Solution, Failure> {
     progress.stage("refining", 0);
-    let start = at_full_resolution(&selected.solution.model, model);
-    let mut free = recalibrated(&start);
-    for effect in model.effects.len()..start.effects.len() {
-        free.extend(Free::of_effect(&start, effect));
-    }
-    solve_in_rounds(objective, &start, &free, FINAL_PATIENCE, &[FINE_STEP])
+    let start = at_full_resolution(&selected.model, model);
+    let free = Layout::of(model).free(model, &start);
+    let rounds: &[f64] = if selected.complete { &[FINE_STEP] } else { &[] };
+    solve_in_rounds(objective, &start, &free, FINAL_PATIENCE, rounds)
 }
 
 impl Case<'_> {
@@ -187,7 +201,7 @@ impl Case<'_> {
         }
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let left = objective.compare(&stages.after);
-        let unexplained = unexplained::unexplained(objective, model, &left);
+        let unexplained = unexplained::unexplained(objective, &stages.searched);
         let wrong =
             recalibrated_parameters.iter().any(|p| (p.fitted / p.nominal - 1.0).abs() > WRONG_PARAMETER);
         let loss_before = objective.mean_loss(&objective.compare(&stages.before), Part::HeldOut);
@@ -227,8 +241,10 @@ impl Case<'_> {
             indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model)
                 .unwrap_or_default(),
             mismatch: place::mismatch(objective, &objective.compare(&stages.recalibrated)),
+            residual_map: residual_map::residual_map(objective, stages),
             unexplained,
             fit: Fit { heldout: true, channels },
+            search: selected.rounds.iter().map(search_round).collect(),
             rig: rig.name.clone(),
             recordings: training.iter().map(|r| r.source().to_owned()).collect(),
             heldout: if heldout.is_empty() {
@@ -288,6 +304,23 @@ fn named(
         sentence: words::sentence(&active, improvement, objective.duration_s()),
         rivals,
     }
+}
+
+fn search_round(round: &Round) -> SearchRound {
+    let attempt = |Attempted { effect, promised, heldout_loss }: &Attempted| Attempt {
+        id: effect.descriptor().id.to_owned(),
+        channel: effect.target.name().map(str::to_owned),
+        parameters: effect
+            .descriptor()
+            .parameters
+            .iter()
+            .zip(effect.parameters)
+            .map(|(spec, value)| (spec.name.to_owned(), value))
+            .collect(),
+        promised: *promised,
+        heldout_loss: *heldout_loss,
+    };
+    SearchRound { loss_before: round.loss_before, tried: round.candidates.iter().map(attempt).collect() }
 }
 
 /// Traces of the first recording.

@@ -64,6 +64,20 @@ fn refuse_inputs(path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Removes a file that an earlier run wrote.
+///
+/// # Errors
+/// Exit status 1 with the reason, if the medium refuses.
+pub fn remove_file(path: &Path) -> Result<(), Failure> {
+    fs::remove_file(path).map_err(|error| {
+        Failure::failed(format!(
+            "{}: cannot be removed: {}; remove it yourself",
+            path.display(),
+            describe(&error)
+        ))
+    })
+}
+
 /// Writes a file; it appears under its name only when it is complete.
 ///
 /// # Errors

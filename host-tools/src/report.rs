@@ -8,6 +8,8 @@
 mod axis;
 mod envelope;
 mod figures;
+mod free_form;
+mod map;
 mod names;
 mod page;
 mod physics;

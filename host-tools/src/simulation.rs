@@ -11,7 +11,7 @@
 
 use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
-use bowden_model::effect::SensorPort;
+use bowden_model::effect::{ActiveEffect, SensorPort};
 use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
 use bowden_model::plant::{Plant, PlantConfig, StepInput};
 
@@ -160,6 +160,28 @@ impl Prediction {
     #[must_use]
     pub fn channel(&self, channel: Channel) -> Option<&[f64]> {
         self.channels.iter().find(|(c, _)| *c == channel).map(|(_, values)| values.as_slice())
+    }
+
+    /// The same joint seen with one more effect on its sensors, in the last place.
+    ///
+    /// # Errors
+    /// When the set of one effect cannot be made.
+    pub fn seen_through(&self, effect: ActiveEffect, input: &ReplayInput) -> Result<Self, Failure> {
+        let effects = EffectSet::from_slice(&[effect]).map_err(Failure::bad_input)?;
+        let mut seen = self.clone();
+        for (channel, values) in
+            seen.channels.iter_mut().filter(|(channel, _)| effect.target.includes(*channel))
+        {
+            let mut states = FRESH_STATES;
+            let mut before_s = input.t_s.first().copied().unwrap_or(0.0);
+            for (value, &t_s) in values.iter_mut().zip(&input.t_s) {
+                let mut port = SensorPort { t_s, dt_s: t_s - before_s, value: *value };
+                before_s = t_s;
+                effects.measure(*channel, &mut states, &mut port);
+                *value = port.value;
+            }
+        }
+        Ok(seen)
     }
 
     /// All channels.

@@ -284,6 +284,12 @@ pub trait Effect: Sync {
     /// Name, component and parameters.
     fn descriptor(&self) -> &'static Descriptor;
 
+    /// Whether a search for missing physics tries it only where the user asks for it: physics beyond the fixed list of names
+    /// that a diagnosis may use unasked.
+    fn on_request(&self) -> bool {
+        false
+    }
+
     /// Law of sheath friction that replaces the rig's when the simulation is set up.
     fn friction_law(&self) -> Option<FrictionLaw> {
         None

@@ -14,6 +14,7 @@ mod gear_load_friction;
 mod joint_backlash;
 mod joint_coulomb_friction;
 mod joint_spring;
+mod joint_torque_ripple;
 mod joint_viscous_friction;
 mod motor_cogging;
 mod motor_coulomb_friction;
@@ -49,6 +50,7 @@ use gear_load_friction::GearLoadFriction;
 use joint_backlash::JointBacklash;
 use joint_coulomb_friction::JointCoulombFriction;
 use joint_spring::JointSpring;
+use joint_torque_ripple::JointTorqueRipple;
 use joint_viscous_friction::JointViscousFriction;
 use motor_cogging::MotorCogging;
 use motor_coulomb_friction::MotorCoulombFriction;
@@ -72,7 +74,7 @@ use wrap_angle_disturbed::WrapAngleDisturbed;
 use wrap_angle_varies_with_pose::WrapAngleVariesWithPose;
 
 /// All effects, input to output.
-pub static CATALOGUE: [&dyn Effect; 33] = [
+pub static CATALOGUE: [&dyn Effect; 34] = [
     &MotorCoulombFriction,
     &MotorViscousFriction,
     &MotorStribeckFriction,
@@ -99,6 +101,7 @@ pub static CATALOGUE: [&dyn Effect; 33] = [
     &JointViscousFriction,
     &JointBacklash,
     &JointSpring,
+    &JointTorqueRipple,
     &EndStopContact,
     &PayloadChange,
     &EncoderEccentricity,

@@ -15,8 +15,8 @@ use bowden_model::channel::Channel;
 use bowden_model::effects::find;
 use bowden_tests::{recording_of, rms_difference};
 use virtual_bench::{
-    Case, ConcealedEffect, JointBacklash, MotionKind, MotorCoulombFriction, Parameter, PretensionLoss,
-    SensorGainError,
+    Case, ConcealedEffect, JointBacklash, JointTorqueRipple, MotionKind, MotorCoulombFriction, Parameter,
+    PretensionLoss, SensorGainError,
 };
 
 /// Length of the diagnosed recordings, s.
@@ -34,12 +34,16 @@ struct Outcome {
 
 impl Outcome {
     fn of(case: &Case) -> Self {
+        Self::asking(case, &[])
+    }
+
+    fn asking(case: &Case, asked: &[&str]) -> Self {
         let begun = Instant::now();
         let training = recording_of(&case.train(MotionKind::Lab, SECONDS).unwrap());
         let second = case.heldout(MotionKind::LabHeldout, SECOND_SECONDS, SECONDS).unwrap();
         let second = recording_of(&second);
         let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
-        let diagnosed = diagnose(&rig, &[training], &[], &Quiet).unwrap();
+        let diagnosed = diagnose(&rig, &[training], &[], asked, &Quiet).unwrap();
         let mut document = RigDocument::parse(&case.rig_toml(), "rig.toml").unwrap();
         diagnosed.write_into(&mut document).unwrap();
         let found = Rig::parse(&document.to_string(), "rig.diagnosed.toml").unwrap();
@@ -160,6 +164,25 @@ fn wrong_parameters_alone() {
         assert!((found_ratio / ratio - 1.0).abs() < 0.06, "{path}: {found_ratio} for {ratio}");
     }
     outcome.predicts_within(0.5);
+}
+
+#[test]
+fn physics_beyond_the_fixed_list_is_named_where_it_is_asked_for_and_only_there() {
+    let ripple = JointTorqueRipple { peak_nm: 0.14, cycles_per_turn: 20.0, phase_rad: 1.0 };
+    let case = Case::new("case", vec![ripple.into()], 108, 3.0);
+    let asked = Outcome::asking(&case, &["joint_torque_ripple"]);
+    let effect = asked.only_effect();
+    assert_eq!((effect.id.as_str(), effect.component.as_str()), ("joint_torque_ripple", "joint"));
+    for (name, concealed, tolerance) in
+        [("amplitude_nm", 0.14, 0.2 * 0.14), ("cycles_per_turn", 20.0, 0.03 * 20.0), ("phase_rad", 1.0, 0.3)]
+    {
+        let found = effect.parameters[name].value;
+        assert!((found - concealed).abs() < tolerance, "{name}: {found} for {concealed}");
+    }
+    asked.predicts_within(0.9);
+
+    let unasked = Outcome::of(&case);
+    assert!(unasked.diagnosis.effects.iter().all(|effect| effect.id != "joint_torque_ripple"));
 }
 
 #[test]

@@ -1,7 +1,10 @@
 //! `bowden diagnose`: which physics the rig's simulation lacks.
 
+use std::fs;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use bowden_model::effects::CATALOGUE;
 
 use super::{all_paths, load_recordings, outcome_of, print};
 use crate::diagnose::diagnose;
@@ -32,6 +35,14 @@ pub struct DiagnoseArguments {
     /// Recordings that judge the diagnosis and take no other part; without them a part of the others is held out
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     heldout: Vec<PathBuf>,
+    /// Try this effect too; for those that are not tried unless asked for. May be repeated
+    #[arg(long, value_name = "EFFECT", value_parser = clap::builder::PossibleValuesParser::new(on_request()))]
+    also: Vec<String>,
+}
+
+/// Effects that are tried only where the user asks for them.
+fn on_request() -> impl Iterator<Item = &'static str> {
+    CATALOGUE.iter().filter(|effect| effect.on_request()).map(|effect| effect.descriptor().id)
 }
 
 /// What a diagnosis works on, checked.
@@ -71,7 +82,9 @@ impl DiagnoseArguments {
         output::check_folder(&self.out)?;
         let training = load_recordings(&rig, &self.recordings)?;
         let heldout = load_recordings(&rig, &self.heldout)?;
-        output::prepare_folder(&self.out, &FILES, &inputs)?;
+        let earlier = earlier_experiments(&self.out);
+        let files: Vec<&str> = FILES.into_iter().chain(earlier.iter().map(String::as_str)).collect();
+        output::prepare_folder(&self.out, &files, &inputs)?;
         Ok(DiagnoseTask { rig, document, training, heldout, out: self.out.clone() })
     }
 
@@ -83,7 +96,8 @@ impl DiagnoseArguments {
         interrupt::catch()?;
         let mut task = self.prepare()?;
         let progress = &UntilInterrupted(progress);
-        let diagnosed = diagnose(&task.rig, &task.training, &task.heldout, progress)?;
+        let also: Vec<&str> = self.also.iter().map(String::as_str).collect();
+        let diagnosed = diagnose(&task.rig, &task.training, &task.heldout, &also, progress)?;
         let [result, page, rig] = FILES.map(|name| task.out.join(name));
         let json = serde_json::to_string_pretty(&diagnosed.findings.diagnosis)
             .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
@@ -91,6 +105,9 @@ impl DiagnoseArguments {
         output::write_file(&page, |file| file.write_all(report::render(&diagnosed.findings).as_bytes()))?;
         diagnosed.write_into(&mut task.document)?;
         task.document.save(&rig)?;
+        for earlier in earlier_experiments(&task.out) {
+            output::remove_file(&task.out.join(earlier))?;
+        }
         for experiment in &diagnosed.experiments {
             experiment.reference.save(&task.out.join(&experiment.file))?;
         }
@@ -102,5 +119,37 @@ impl DiagnoseArguments {
             ]);
         }
         Ok(outcome)
+    }
+}
+
+/// Names of the references that an earlier diagnosis left in `folder`: they ask for what may be settled by now.
+fn earlier_experiments(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .filter(|name| {
+            let reference = name.strip_suffix(".csv").and_then(|name| name.strip_prefix("separate-"));
+            reference.is_some_and(|pair| pair.contains("-from-"))
+        })
+        .collect();
+    names.sort_unstable();
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_of_an_earlier_diagnosis_are_found_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let ours = ["separate-a-from-b.csv", "separate-joint_spring-from-payload_change.csv"];
+        for name in
+            ours.into_iter().chain(["separate.csv", "from-a.csv", "separate-a-from-b.mcap", "report.html"])
+        {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(earlier_experiments(folder.path()), ours);
+        assert_eq!(earlier_experiments(&folder.path().join("not there")), [""; 0]);
     }
 }

@@ -14,8 +14,11 @@ use crate::simulation::Prediction;
 /// Moments at which an effect with an onset is tried, spread over the recording.
 const ONSETS: usize = 12;
 
-/// Periods per turn at which cogging is looked for.
-const COGGING_PERIODS: std::ops::RangeInclusive<usize> = 2..=240;
+/// Periods per turn at which a torque locked to an angle is looked for.
+const LOCKED_PERIODS: std::ops::RangeInclusive<usize> = 2..=240;
+
+/// Of so many samples one is looked at for it.
+const LOCKED_STRIDE: usize = 5;
 
 /// One effect and where to start.
 #[derive(Clone, Debug)]
@@ -24,17 +27,24 @@ pub struct Candidate {
     pub starts: Vec<ActiveEffect>,
 }
 
-/// All effects that the parts of `model` can have and that it does not contain yet.
+/// All effects that the parts of `model` can have and that it does not contain yet; of those that are tried on request
+/// only the `asked` ones.
 ///
 /// `predictions` are those of `model`; effects whose starting point can be read off their differences use them.
 #[must_use]
-pub fn candidates(model: &JointModel, objective: &Objective, predictions: &[Prediction]) -> Vec<Candidate> {
+pub fn candidates(
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+    asked: &[&str],
+) -> Vec<Candidate> {
     let mut found = Vec::new();
     for effect in CATALOGUE {
         let descriptor = effect.descriptor();
         // On a rig whose friction is distributed already, an effect that distributes it changes nothing.
         let redundant = effect.friction_law() == Some(model.parameters.friction);
-        if redundant || !fits(model, descriptor.component) {
+        let unasked = effect.on_request() && !asked.contains(&descriptor.id);
+        if unasked || redundant || !fits(model, descriptor.component) {
             continue;
         }
         for target in targets(model, descriptor) {
@@ -57,7 +67,8 @@ pub fn candidates(model: &JointModel, objective: &Objective, predictions: &[Pred
 
 fn fits(model: &JointModel, component: Component) -> bool {
     match component {
-        Component::Motor => model.parameters.motor.is_some(),
+        // Without a motor, its effects are the friction of an input spindle that is turned as prescribed.
+        Component::Motor => model.parameters.motor.is_some() || model.outputs.contains(&Channel::TorqueIn),
         Component::Transmission => model.parameters.tendon.is_some(),
         Component::Joint | Component::Sensors => true,
     }
@@ -94,15 +105,15 @@ fn starts(
 ) -> Vec<ActiveEffect> {
     let parameters = base.descriptor().parameters;
     let strength = parameters.first();
-    let signed = strength.is_some_and(|spec| spec.lower < 0.0);
-    let both_signs = |value: f64| if signed { vec![value, -value] } else { vec![value] };
     let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
     match base.descriptor().id {
         "motor_cogging" => cogging_start(base, objective, predictions).into_iter().collect(),
+        "joint_torque_ripple" => ripple_start(base, model, objective, predictions).into_iter().collect(),
         "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
         "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
         "end_stop_contact" => end_stop_starts(base, model, objective),
-        "encoder_eccentricity" => (0..4)
+        // The other two quarters are these with the other sign.
+        "encoder_eccentricity" => (0..2)
             .map(|quarter| base.with("phase_rad", f64::from(quarter) * TAU / 4.0 - TAU / 2.0 + 0.01))
             .collect(),
         "sensor_gain_error" => [0.92, 1.08].map(|gain| base.with("gain", gain)).to_vec(),
@@ -110,12 +121,14 @@ fn starts(
         _ => match (strength, onset) {
             (None, _) => vec![base],
             (Some(strength), Some(onset)) => {
-                onset_starts(base, onset, &both_signs(strength.default), objective.duration_s())
+                onset_starts(base, onset, strength.default, objective.duration_s())
             }
             (Some(strength), None) => {
-                let values: Vec<f64> = [0.4, 1.0, 2.5]
+                // What has either sign goes nearly with its strength; screening finds the sign.
+                let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &[0.4, 1.0, 2.5] };
+                let values: Vec<f64> = factors
                     .iter()
-                    .flat_map(|factor| both_signs(from_neutral(base, strength.default, *factor)))
+                    .map(|factor| from_neutral(base, strength.default, *factor))
                     .map(|value| value.clamp(strength.lower, strength.upper))
                     .collect();
                 steady_starts(base, &values)
@@ -124,19 +137,19 @@ fn starts(
     }
 }
 
-/// The given strengths at moments spread over the recordings.
+/// The given strength at moments spread over the recordings; screening finds the sign.
 fn onset_starts(
     base: ActiveEffect,
     onset: &ParameterSpec,
-    strengths: &[f64],
+    strength: f64,
     duration_s: f64,
 ) -> Vec<ActiveEffect> {
     (0..ONSETS)
-        .flat_map(|k| {
+        .map(|k| {
             let at = base
                 .with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
                 .with("duration_s", duration_s / 6.0);
-            strengths.iter().map(move |value| with_strength(at, *value))
+            with_strength(at, strength)
         })
         .collect()
 }
@@ -167,37 +180,38 @@ fn from_neutral(base: ActiveEffect, default: f64, factor: f64) -> f64 {
     neutral + factor * (default - neutral)
 }
 
-/// Amplitude, period and phase from the torque that guided the motor, by least squares over every whole period.
-fn cogging_start(
+/// Amplitude, period and phase of a torque locked to an angle, by least squares over every whole period.
+///
+/// `samples` gives, for one recording, angle and torque sample by sample.
+fn locked_start(
     base: ActiveEffect,
-    objective: &Objective,
     predictions: &[Prediction],
+    samples: impl Fn(usize, &Prediction) -> Option<Vec<(f64, f64)>>,
 ) -> Option<ActiveEffect> {
+    let samples: Option<Vec<_>> = predictions
+        .iter()
+        .enumerate()
+        .map(|(recording, prediction)| samples(recording, prediction))
+        .collect();
+    let samples: Vec<(f64, f64)> = samples?.into_iter().flatten().collect();
     let mut best: Option<(f64, ActiveEffect)> = None;
-    for periods in COGGING_PERIODS {
+    for periods in LOCKED_PERIODS {
         let n = periods as f64;
-        let (mut ss, mut cc, mut sc, mut sg, mut cg) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (recording, prediction) in predictions.iter().enumerate() {
-            let motion = objective.input(recording).motion()?;
-            for (k, guide) in prediction.guide_nm.iter().enumerate().step_by(5) {
-                // A motor that stands tells nothing about the position lock.
-                if motion.omega_rad_s[k].abs() < 0.02 {
-                    continue;
-                }
-                let (sin, cos) = (n * motion.theta_rad[k]).sin_cos();
-                ss += sin * sin;
-                cc += cos * cos;
-                sc += sin * cos;
-                sg += sin * guide;
-                cg += cos * guide;
-            }
+        let (mut ss, mut cc, mut sc, mut st, mut ct) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (angle_rad, torque_nm) in &samples {
+            let (sin, cos) = (n * angle_rad).sin_cos();
+            ss += sin * sin;
+            cc += cos * cos;
+            sc += sin * cos;
+            st += sin * torque_nm;
+            ct += cos * torque_nm;
         }
         let determinant = ss * cc - sc * sc;
         if determinant <= 1e-9 * ss * cc {
             continue;
         }
-        let (a, b) = ((sg * cc - cg * sc) / determinant, (cg * ss - sg * sc) / determinant);
-        let gain = a * sg + b * cg;
+        let (a, b) = ((st * cc - ct * sc) / determinant, (ct * ss - st * sc) / determinant);
+        let gain = a * st + b * ct;
         if best.as_ref().is_none_or(|(most, _)| gain > *most) {
             let start = base
                 .with("amplitude_nm", a.hypot(b))
@@ -207,6 +221,55 @@ fn cogging_start(
         }
     }
     best.map(|(_, start)| start)
+}
+
+/// What the motor's model lacks is the torque that guided it, or that a spindle without motor took beyond what was
+/// predicted.
+fn cogging_start(
+    base: ActiveEffect,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Option<ActiveEffect> {
+    locked_start(base, predictions, |recording, prediction| {
+        let motion = objective.input(recording).motion()?;
+        let lacking = lacking_nm(objective, recording, prediction)?;
+        let lacking = lacking.into_iter().enumerate().step_by(LOCKED_STRIDE);
+        // A motor that stands tells nothing about the position lock.
+        let moving = lacking.filter(|(k, _)| motion.omega_rad_s[*k].abs() >= 0.02);
+        Some(moving.map(|(k, torque_nm)| (motion.theta_rad[k], torque_nm)).collect())
+    })
+}
+
+/// Torque that helps the input round beyond what the model gives it.
+fn lacking_nm(objective: &Objective, recording: usize, prediction: &Prediction) -> Option<Vec<f64>> {
+    if !prediction.guide_nm.is_empty() {
+        return Some(prediction.guide_nm.clone());
+    }
+    let measured = objective.measured(recording, Series::Channel(Channel::TorqueIn))?;
+    let predicted = prediction.channel(Channel::TorqueIn)?;
+    let less = || predicted.iter().zip(measured).map(|(predicted, measured)| predicted - measured);
+    let mean = less().sum::<f64>() / measured.len().max(1) as f64;
+    Some(less().map(|torque_nm| torque_nm - mean).collect())
+}
+
+/// What the joint's model lacks is what the cables carried less than predicted.
+fn ripple_start(
+    base: ActiveEffect,
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Option<ActiveEffect> {
+    let radius_m = model.parameters.pulleys?.output_radius_m;
+    locked_start(base, predictions, |recording, prediction| {
+        let of = |channel| {
+            let measured = objective.measured(recording, Series::Channel(channel))?;
+            Some((measured, prediction.channel(channel)?))
+        };
+        let ((a, a_predicted), (b, b_predicted)) = (of(Channel::F2)?, of(Channel::F4)?);
+        let theta = objective.measured(recording, Series::Channel(Channel::ThetaOut))?;
+        let less = |k: usize| radius_m * ((a_predicted[k] - b_predicted[k]) - (a[k] - b[k]));
+        Some((0..theta.len()).step_by(LOCKED_STRIDE).map(|k| (theta[k], less(k))).collect())
+    })
 }
 
 /// Offset from the mean difference of the channel.

@@ -60,8 +60,16 @@ pub(crate) const fn component_of(series: Series) -> Component {
     }
 }
 
+/// Unit of a series.
+pub(crate) const fn unit_of(series: Series) -> &'static str {
+    match series {
+        Series::Channel(channel) => channel.unit(),
+        Series::Guide => "N m",
+    }
+}
+
 /// Speed of the input at every sample of a recording.
-fn speed(objective: &Objective, recording: usize) -> Vec<f64> {
+pub(crate) fn speed(objective: &Objective, recording: usize) -> Vec<f64> {
     let input = objective.input(recording);
     if let Some(motion) = input.motion() {
         return motion.omega_rad_s.clone();
@@ -172,10 +180,7 @@ pub(crate) fn regimes(objective: &Objective, stages: &Stages) -> Vec<RegimeResid
             let (series, regime) = *key;
             RegimeResidual {
                 channel: series.name().to_owned(),
-                unit: match series {
-                    Series::Channel(channel) => channel.unit().to_owned(),
-                    Series::Guide => "N m".to_owned(),
-                },
+                unit: unit_of(series).to_owned(),
                 regime: regime.name().to_owned(),
                 before_rmse: rms(Some(sum)),
                 recalibrated_rmse: rms(recalibrated.get(key)),

@@ -3,19 +3,25 @@
 //!
 //! With residuals `r` of the present model, slopes `J` over its parameters and residuals `r_c` of a candidate, the loss
 //! after a refit is estimated as `min_b |P (r + b (r_c - r))|²` with the projection `P = 1 - J (JᵀJ)⁻¹ Jᵀ`: exact for an
-//! effect that enters linearly, a ranking for the others.
+//! effect that enters linearly, a ranking for the others; those that it ranks first are simulated at their estimated strength.
 
-use bowden_model::effect::ActiveEffect;
+use bowden_model::effect::{ActiveEffect, Component};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidates::Candidate;
+use super::layout::Layout;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::{Solution, training_rows};
-use crate::joint_model::JointModel;
+use crate::outcome::Failure;
 use crate::progress::Progress;
+use crate::simulation::Prediction;
 
-/// Strengths, in starting strengths, between which the linear estimate is trusted.
+/// Candidates whose estimated strength is simulated, of those that the estimate ranks first.
+const VERIFIED: usize = 10;
+
+/// Strengths, in starting strengths, between which the linear estimate is trusted, and as far on the other side for what
+/// has either sign.
 const TRUSTED: std::ops::RangeInclusive<f64> = 0.15..=3.0;
 
 /// A candidate after screening.
@@ -27,78 +33,131 @@ pub struct Screened {
     pub gain: f64,
 }
 
+/// A starting point that was simulated, and what follows from it for another strength.
+struct Judged {
+    start: Screened,
+    linear: Option<Screened>,
+}
+
+impl Judged {
+    fn best(&self) -> &Screened {
+        self.linear.as_ref().filter(|linear| linear.gain > self.start.gain).unwrap_or(&self.start)
+    }
+}
+
+/// What candidates are judged against.
+pub struct Present<'a> {
+    /// Model so far, fitted.
+    pub solution: &'a Solution,
+    /// Whose its effects are.
+    pub layout: &'a Layout,
+    /// What it predicts.
+    pub predictions: &'a [Prediction],
+}
+
 /// Ranks candidates, best first.
 #[must_use]
 pub fn screen(
     objective: &Objective,
-    present: &Solution,
+    present: &Present<'_>,
     candidates: &[Candidate],
     progress: &dyn Progress,
 ) -> Vec<Screened> {
     let [objective, _] = &objective.split();
-    let basis = Basis::new(&present.jacobian);
-    let now = basis.without(&rows(objective, &present.residuals));
-    let loss_now = now.norm_squared();
+    let basis = Basis::new(&present.solution.jacobian);
+    let now = basis.without(&rows(objective, &present.solution.residuals));
+    let background = Background { objective, present, basis, loss_now: now.norm_squared(), now };
     let starts: Vec<(usize, ActiveEffect)> = candidates
         .iter()
         .enumerate()
         .flat_map(|(c, candidate)| candidate.starts.iter().map(move |s| (c, *s)))
         .collect();
-    let judged: Vec<(usize, Option<Screened>)> = starts
+    let judged: Vec<(usize, Option<Judged>)> = starts
         .par_iter()
         .map(|(candidate, start)| {
-            let screened = if progress.interrupted() {
-                None
-            } else {
-                judge(objective, &present.model, *start, &basis, &now, loss_now)
-            };
+            let judged = if progress.interrupted() { None } else { background.judge(*start) };
             progress.advance(1);
-            (*candidate, screened)
+            (*candidate, judged)
         })
         .collect();
-    let mut best: Vec<Option<Screened>> = vec![None; candidates.len()];
-    for (candidate, screened) in judged {
-        if let Some(screened) = screened
-            && best[candidate].as_ref().is_none_or(|b| screened.gain > b.gain)
+    let mut best: Vec<Option<Judged>> = candidates.iter().map(|_| None).collect();
+    for (candidate, judged) in judged {
+        if let Some(judged) = judged
+            && best[candidate].as_ref().is_none_or(|b| judged.best().gain > b.best().gain)
         {
-            best[candidate] = Some(screened);
+            best[candidate] = Some(judged);
         }
     }
-    let mut ranked: Vec<Screened> = best.into_iter().flatten().collect();
-    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    ranked
+    let mut ranked: Vec<Judged> = best.into_iter().flatten().collect();
+    ranked.sort_by(|a, b| b.best().gain.total_cmp(&a.best().gain));
+    let mut screened: Vec<Screened> = ranked
+        .into_par_iter()
+        .enumerate()
+        .map(|(place, judged)| match &judged.linear {
+            Some(linear) if place < VERIFIED && linear.gain > judged.start.gain => {
+                // Play and stick bend the way between two strengths; only a simulation tells.
+                let there = background.judge(linear.start);
+                there
+                    .map(|there| there.start)
+                    .filter(|there| there.gain > judged.start.gain)
+                    .unwrap_or(judged.start)
+            }
+            _ => judged.best().clone(),
+        })
+        .collect();
+    screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    screened
 }
 
-fn judge(
-    objective: &Objective,
-    model: &JointModel,
-    start: ActiveEffect,
-    basis: &Basis,
-    now: &DVector<f64>,
+/// What every start is compared with.
+struct Background<'a> {
+    objective: &'a Objective,
+    present: &'a Present<'a>,
+    basis: Basis,
+    /// What the present parameters cannot take off.
+    now: DVector<f64>,
     loss_now: f64,
-) -> Option<Screened> {
-    let mut with = model.clone();
-    with.effects.push(start);
-    let residuals = objective.residuals(&with).ok()?;
-    if !residuals.is_finite() {
-        return None;
+}
+
+impl Background<'_> {
+    fn judge(&self, start: ActiveEffect) -> Option<Judged> {
+        let Self { objective, basis, now, .. } = self;
+        let residuals = self.residuals(start).ok()?;
+        if !residuals.is_finite() {
+            return None;
+        }
+        let there = basis.without(&rows(objective, &residuals));
+        let gain_of = |loss: f64| 1.0 - loss / self.loss_now.max(f64::MIN_POSITIVE);
+        let at_start = Screened { start, gain: gain_of(there.norm_squared()) };
+        let direction = &there - now;
+        let along = direction.norm_squared();
+        let step = if along > 0.0 { -now.dot(&direction) / along } else { 0.0 };
+        let linear =
+            start.descriptor().neutral.filter(|_| TRUSTED.contains(&step.abs())).and_then(|neutral| {
+                let spec = start.descriptor().parameters[0];
+                let mut moved = start;
+                moved.parameters[0] = neutral + step * (start.parameters[0] - neutral);
+                let possible = step > 0.0 || moved.parameters[0] >= spec.lower;
+                moved.parameters[0] = moved.parameters[0].clamp(spec.lower, spec.upper);
+                possible.then(|| Screened {
+                    start: moved,
+                    gain: gain_of((now + direction * step).norm_squared()),
+                })
+            });
+        Some(Judged { start: at_start, linear })
     }
-    let there = basis.without(&rows(objective, &residuals));
-    let gain_of = |loss: f64| 1.0 - loss / loss_now.max(f64::MIN_POSITIVE);
-    let at_start = Screened { start, gain: gain_of(there.norm_squared()) };
-    let direction = &there - now;
-    let along = direction.norm_squared();
-    let step = if along > 0.0 { -now.dot(&direction) / along } else { 0.0 };
-    let linear = start.descriptor().neutral.filter(|_| TRUSTED.contains(&step)).map(|neutral| {
-        let spec = start.descriptor().parameters[0];
-        let mut moved = start;
-        moved.parameters[0] =
-            (neutral + step * (start.parameters[0] - neutral)).clamp(spec.lower, spec.upper);
-        Screened { start: moved, gain: gain_of((now + direction * step).norm_squared()) }
-    });
-    match linear {
-        Some(linear) if linear.gain > at_start.gain => Some(linear),
-        _ => Some(at_start),
+
+    fn residuals(&self, start: ActiveEffect) -> Result<Residuals, Failure> {
+        let Present { solution, layout, predictions } = self.present;
+        let model = &solution.model;
+        // A sensor that drives nothing changes nothing but what is seen of the same motion.
+        let only_seen = start.descriptor().component == Component::Sensors
+            && !model.inputs.iter().any(|channel| start.target.includes(*channel));
+        if only_seen {
+            self.objective.residuals_seen_through(predictions, start)
+        } else {
+            self.objective.residuals(&layout.with(model, start).1)
+        }
     }
 }
 

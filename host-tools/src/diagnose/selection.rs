@@ -4,20 +4,21 @@
 use bowden_model::effect::ActiveEffect;
 
 use super::candidates::candidates;
-use super::screening::screen;
-use crate::fit::free::{Free, recalibrated};
+use super::layout::Layout;
+use super::screening::{Present, screen};
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds, solve_with_slopes};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 
-/// Share of the held-out loss that an effect must remove. Contact, mesh and solver of a real bench differ from the
-/// simulation by some 0.2 N, and effects that imitate that remove a part of it.
-pub const WORTHWHILE_SHARE: f64 = 0.25;
+/// Share of the held-out loss that an effect must remove: what two realities differ by is not all ordinary contact and
+/// friction, and effects that imitate the rest remove a part of it.
+pub const WORTHWHILE_SHARE: f64 = 0.15;
 
-/// Loss, in squared scales, that an effect must remove whatever the share.
-pub const WORTHWHILE_LOSS: f64 = 0.3;
+/// Loss, in squared scales, that an effect must remove whatever the share. On virtual benches that hide nothing
+/// candidates remove up to 0.07, as `search` in their `diagnosis.json` tells.
+pub const WORTHWHILE_LOSS: f64 = 0.1;
 
 /// Advantage in held-out loss that each further parameter must earn between two candidates.
 const LOSS_PER_PARAMETER: f64 = 0.03;
@@ -35,8 +36,11 @@ const FITTED: usize = 7;
 /// Candidates whose fit is brought to an end, of those that fit best so far.
 const FINALISTS: usize = 3;
 
+/// Held-out loss, over that of the best, beyond which a candidate is no finalist.
+const BEHIND: f64 = 2.5;
+
 /// Estimated gain below which a candidate is not fitted.
-const PROMISING: f64 = 0.05;
+const PROMISING: f64 = 0.08;
 
 /// Most effects that are named at once.
 const MOST_EFFECTS: usize = 3;
@@ -53,6 +57,26 @@ pub struct Tried {
     pub model: JointModel,
     /// Held-out loss with it.
     pub heldout_loss: f64,
+}
+
+/// One round of the search: what was tried beside what was there already.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// Held-out loss before it.
+    pub loss_before: f64,
+    /// Candidates, most promising first.
+    pub candidates: Vec<Attempted>,
+}
+
+/// A candidate of a round.
+#[derive(Clone, Copy, Debug)]
+pub struct Attempted {
+    /// The effect where it was left.
+    pub effect: ActiveEffect,
+    /// Share of the fitted loss that screening promised.
+    pub promised: f64,
+    /// Held-out loss of one that was fitted.
+    pub heldout_loss: Option<f64>,
 }
 
 /// One effect that was chosen.
@@ -75,10 +99,14 @@ pub struct Chosen {
 pub struct Selected {
     /// Model with nominal parameters recalibrated, without any new effect.
     pub baseline: Solution,
-    /// Model with all chosen effects.
-    pub solution: Solution,
+    /// Model that the search ended with: all chosen effects and what is ordinary.
+    pub searched: JointModel,
+    /// Model with all chosen effects, as they were last fitted.
+    pub model: JointModel,
     /// Chosen effects in the order of the model's new effects.
     pub chosen: Vec<Chosen>,
+    /// What was tried.
+    pub rounds: Vec<Round>,
     /// Whether the search came to its end.
     pub complete: bool,
 }
@@ -90,68 +118,185 @@ pub struct Selected {
 pub fn select(
     objective: &Objective,
     model: &JointModel,
+    asked: &[&str],
     progress: &dyn Progress,
 ) -> Result<Selected, Failure> {
-    progress.stage("recalibrating", 0);
-    let own = model.effects.len();
-    let baseline = fit(objective, model, own, &[COARSE_STEP, FINE_STEP, FINE_STEP])?;
-    let mut present = baseline.clone();
+    let search = Search { objective, believed: model, asked, progress };
+    let (baseline, mut present) = search.baseline()?;
     let mut chosen: Vec<Chosen> = Vec::new();
+    let mut rounds = Vec::new();
     while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
-        let loss_before = objective.mean_loss(&present.residuals, Part::HeldOut);
-        let predictions = objective.predict(&present.model)?;
-        let all = candidates(&present.model, objective, &predictions);
-        progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
-        let ranked = screen(objective, &present, &all, progress);
-        let promising: Vec<_> = ranked.iter().filter(|s| s.gain > PROMISING).take(FITTED).collect();
-        progress.stage("fitting effects", promising.len() as u64);
-        let mut fits: Vec<(f64, Solution)> = Vec::new();
-        for screened in promising {
-            if progress.interrupted() {
-                break;
-            }
-            let mut with = present.model.clone();
-            with.effects.push(screened.start);
-            let solution = fit_new(objective, &with, own, &present)?;
-            fits.push((objective.mean_loss(&solution.residuals, Part::HeldOut), solution));
-            progress.advance(1);
-        }
-        fits.retain(|(_, solution)| !solution.model.effects.last().is_some_and(negligible));
-        fits.sort_by(|a, b| handicapped(a.0, &a.1).total_cmp(&handicapped(b.0, &b.1)));
-        for (loss, solution) in fits.iter_mut().take(FINALISTS) {
-            if progress.interrupted() {
-                break;
-            }
-            *solution = fit(objective, &solution.model, own, &[FINE_STEP])?;
-            *loss = objective.mean_loss(&solution.residuals, Part::HeldOut);
-        }
-        fits.retain(|(_, solution)| !solution.model.effects.last().is_some_and(negligible));
-        fits.sort_by(|a, b| handicapped(a.0, &a.1).total_cmp(&handicapped(b.0, &b.1)));
+        let (record, mut fits) = search.one_more(&present)?;
+        rounds.push(Round { loss_before: present.loss, candidates: record });
         if fits.is_empty() {
             break;
         }
-        let (loss_after, solution) = fits.remove(0);
-        if !worthwhile(loss_before, loss_after) {
+        let best = fits.remove(0);
+        if !worthwhile(present.loss, best.loss) {
             break;
         }
-        let newest = |solution: &Solution| solution.model.effects[solution.model.effects.len() - 1];
-        let effect = newest(&solution);
-        let others = fits
-            .iter()
-            .map(|(heldout_loss, solution)| Tried {
-                effect: newest(solution),
-                model: solution.model.clone(),
-                heldout_loss: *heldout_loss,
-            })
-            .collect();
-        let model = solution.model.clone();
+        let tried = |fitted: &Fitted| Tried {
+            effect: fitted.newest(),
+            model: fitted.without_ordinary(),
+            heldout_loss: fitted.loss,
+        };
+        let Tried { effect, model, .. } = tried(&best);
+        let (loss_before, loss_after) = (present.loss, best.loss);
+        let others = fits.iter().map(tried).collect();
         chosen.push(Chosen { effect, model, loss_before, loss_after, others });
-        present = solution;
+        present = best;
     }
     if !progress.interrupted() {
-        prune(objective, own, &mut present, &mut chosen, progress)?;
+        search.prune(&mut present, &mut chosen)?;
     }
-    Ok(Selected { baseline, solution: present, chosen, complete: !progress.interrupted() })
+    let model = present.without_ordinary();
+    let searched = present.solution.model;
+    Ok(Selected { baseline, searched, model, chosen, rounds, complete: !progress.interrupted() })
+}
+
+/// A fitted model, whose effects are whose, and how well it does on held-out data.
+#[derive(Clone)]
+struct Fitted {
+    layout: Layout,
+    solution: Solution,
+    loss: f64,
+}
+
+impl Fitted {
+    /// The effect that was added last.
+    fn newest(&self) -> ActiveEffect {
+        self.solution.model.effects[self.solution.model.effects.len() - 1]
+    }
+
+    fn without_ordinary(&self) -> JointModel {
+        self.layout.without_ordinary(&self.solution.model)
+    }
+
+    /// Held-out loss with the advantage that simpler effects get.
+    fn handicapped(&self) -> f64 {
+        self.loss * (1.0 + LOSS_PER_PARAMETER * self.newest().descriptor().parameters.len() as f64)
+    }
+}
+
+/// What all steps of a search share.
+struct Search<'a> {
+    objective: &'a Objective,
+    /// What the rig states.
+    believed: &'a JointModel,
+    /// Effects that are tried beside those that always are.
+    asked: &'a [&'a str],
+    progress: &'a dyn Progress,
+}
+
+impl Search<'_> {
+    /// The recalibrated model, and the same with what is ordinary, where there may be one.
+    fn baseline(&self) -> Result<(Solution, Fitted), Failure> {
+        self.progress.stage("recalibrating", 0);
+        let layout = Layout::of(self.believed);
+        let plain = self.fit(layout.clone(), self.believed, &[COARSE_STEP, FINE_STEP])?;
+        let baseline = plain.solution.clone();
+        let (with_ordinary, with) = layout.with_ordinary(&baseline.model);
+        if with_ordinary == layout {
+            return Ok((baseline, plain));
+        }
+        Ok((baseline, self.fit(with_ordinary, &with, &[COARSE_STEP, FINE_STEP])?))
+    }
+
+    /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
+    /// fitted to the end. Returns all candidates for the record, and the fits, best first.
+    fn one_more(&self, present: &Fitted) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
+        let Self { objective, progress, .. } = *self;
+        let predictions = objective.predict(&present.solution.model)?;
+        let all = candidates(&present.without_ordinary(), objective, &predictions, self.asked);
+        progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
+        let ranked = {
+            let Fitted { layout, solution, .. } = present;
+            screen(objective, &Present { solution, layout, predictions: &predictions }, &all, progress)
+        };
+        let promising = ranked.iter().filter(|s| s.gain > PROMISING).take(FITTED).count();
+        progress.stage("fitting effects", promising as u64);
+        let mut record: Vec<Attempted> = ranked
+            .iter()
+            .map(|s| Attempted { effect: s.start, promised: s.gain, heldout_loss: None })
+            .collect();
+        let mut fits: Vec<(usize, Fitted)> = Vec::new();
+        for (place, screened) in ranked.iter().enumerate().take(promising) {
+            if progress.interrupted() {
+                break;
+            }
+            fits.push((place, self.fit_new(present, screened.start)?));
+            progress.advance(1);
+        }
+        let best_first = |fits: &mut Vec<(usize, Fitted)>| {
+            fits.retain(|(_, fitted)| !negligible(&fitted.newest()));
+            fits.sort_by(|(_, a), (_, b)| a.handicapped().total_cmp(&b.handicapped()));
+        };
+        let mut keep = |fits: &[(usize, Fitted)]| {
+            for (place, fitted) in fits {
+                record[*place].effect = fitted.newest();
+                record[*place].heldout_loss = Some(fitted.loss);
+            }
+        };
+        keep(&fits);
+        best_first(&mut fits);
+        let farthest = fits.first().map_or(0.0, |(_, best)| BEHIND * best.loss);
+        for (_, fitted) in fits.iter_mut().take(FINALISTS).filter(|(_, fitted)| fitted.loss <= farthest) {
+            if progress.interrupted() {
+                break;
+            }
+            *fitted = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP])?;
+        }
+        keep(&fits);
+        best_first(&mut fits);
+        Ok((record, fits.into_iter().map(|(_, fitted)| fitted).collect()))
+    }
+
+    /// Removes effects that the later ones have made superfluous.
+    fn prune(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
+        if chosen.len() < 2 {
+            return Ok(());
+        }
+        self.progress.stage("testing each effect again", chosen.len() as u64);
+        let mut index = 0;
+        while index < chosen.len() && chosen.len() > 1 && !self.progress.interrupted() {
+            let mut without = present.solution.model.clone();
+            without.effects.remove(present.layout.first_found() + index);
+            let rest = self.fit(present.layout.clone(), &without, &[COARSE_STEP, FINE_STEP])?;
+            self.progress.advance(1);
+            if worthwhile(rest.loss, present.loss) {
+                chosen[index].loss_before = rest.loss;
+                chosen[index].loss_after = present.loss;
+                index += 1;
+            } else {
+                chosen.remove(index);
+                *present = rest;
+            }
+        }
+        Ok(())
+    }
+
+    /// `present` with one more effect, fitted only as far as a ranking needs.
+    fn fit_new(&self, present: &Fitted, effect: ActiveEffect) -> Result<Fitted, Failure> {
+        let (layout, with) = present.layout.with(&present.solution.model, effect);
+        if layout != present.layout {
+            return self.fit(layout, &with, &[COARSE_STEP]);
+        }
+        let free = layout.free(self.believed, &with);
+        let known = Some(&present.solution.jacobian);
+        let solution = solve_with_slopes(self.objective, &with, &free, PATIENCE, &[COARSE_STEP], known)?;
+        Ok(self.judged(layout, solution))
+    }
+
+    /// Fits the nominal parameters and those of all effects that the rig itself did not state.
+    fn fit(&self, layout: Layout, model: &JointModel, rounds: &[f64]) -> Result<Fitted, Failure> {
+        let free = layout.free(self.believed, model);
+        Ok(self.judged(layout, solve_in_rounds(self.objective, model, &free, PATIENCE, rounds)?))
+    }
+
+    fn judged(&self, layout: Layout, solution: Solution) -> Fitted {
+        let loss = self.objective.mean_loss(&solution.residuals, Part::HeldOut);
+        Fitted { layout, solution, loss }
+    }
 }
 
 /// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.
@@ -175,66 +320,4 @@ fn negligible(effect: &ActiveEffect) -> bool {
             (value - neutral).abs() < NAMED_STRENGTH * (strength.default - neutral).abs()
         }),
     }
-}
-
-/// Held-out loss with the advantage that simpler effects get.
-fn handicapped(loss: f64, solution: &Solution) -> f64 {
-    let parameters = solution.model.effects.last().map_or(0, |effect| effect.descriptor().parameters.len());
-    loss * (1.0 + LOSS_PER_PARAMETER * parameters as f64)
-}
-
-/// Removes effects that the later ones have made superfluous.
-fn prune(
-    objective: &Objective,
-    own: usize,
-    present: &mut Solution,
-    chosen: &mut Vec<Chosen>,
-    progress: &dyn Progress,
-) -> Result<(), Failure> {
-    if chosen.len() < 2 {
-        return Ok(());
-    }
-    progress.stage("testing each effect again", chosen.len() as u64);
-    let mut index = 0;
-    while index < chosen.len() && chosen.len() > 1 && !progress.interrupted() {
-        let loss_with = objective.mean_loss(&present.residuals, Part::HeldOut);
-        let mut without = present.model.clone();
-        without.effects.remove(own + index);
-        let solution = fit(objective, &without, own, &[COARSE_STEP, FINE_STEP])?;
-        let loss_without = objective.mean_loss(&solution.residuals, Part::HeldOut);
-        progress.advance(1);
-        if worthwhile(loss_without, loss_with) {
-            chosen[index].loss_before = loss_without;
-            chosen[index].loss_after = loss_with;
-            index += 1;
-        } else {
-            chosen.remove(index);
-            *present = solution;
-        }
-    }
-    Ok(())
-}
-
-/// Like [`fit`], for a model that is that of `present` with one more effect, and only as far as a ranking needs.
-fn fit_new(
-    objective: &Objective,
-    model: &JointModel,
-    own: usize,
-    present: &Solution,
-) -> Result<Solution, Failure> {
-    let free = free_parameters(model, own);
-    solve_with_slopes(objective, model, &free, PATIENCE, &[COARSE_STEP], Some(&present.jacobian))
-}
-
-/// Fits the nominal parameters and those of all effects beyond the first `own`, which the rig itself stated.
-fn fit(objective: &Objective, model: &JointModel, own: usize, rounds: &[f64]) -> Result<Solution, Failure> {
-    solve_in_rounds(objective, model, &free_parameters(model, own), PATIENCE, rounds)
-}
-
-fn free_parameters(model: &JointModel, own: usize) -> Vec<Free> {
-    let mut free = recalibrated(model);
-    for effect in own..model.effects.len() {
-        free.extend(Free::of_effect(model, effect));
-    }
-    free
 }

@@ -102,6 +102,40 @@ pub struct Mismatch {
     pub share: f64,
 }
 
+/// Variable over which a map is drawn.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MapAxis {
+    /// `theta_rad`, the angle of the input pulley, or of the joint where that is not recorded; `omega_rad_s`, its speed;
+    /// `tension_n`, the largest recorded tension; `t_s`, the time that the recordings take one after the other.
+    pub variable: String,
+    /// Unit.
+    pub unit: String,
+    /// Ends of the bins.
+    pub edges: Vec<f64>,
+}
+
+/// Differences of one channel over every axis of a map.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MapChannel {
+    /// Channel, or `motor_torque_nm`.
+    pub channel: String,
+    /// Unit.
+    pub unit: String,
+    /// Root mean square difference with the rig as it was: axis by axis, bin by bin; `None` where the recordings hardly went.
+    pub before_rmse: Vec<Vec<Option<f64>>>,
+    /// The same with the diagnosed physics.
+    pub after_rmse: Vec<Vec<Option<f64>>>,
+}
+
+/// Where in position, speed, tension and time simulation and recording differ.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ResidualMap {
+    /// Variables.
+    pub axes: Vec<MapAxis>,
+    /// Channels.
+    pub channels: Vec<MapChannel>,
+}
+
 /// Structure that no named effect explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
@@ -111,8 +145,38 @@ pub struct Unexplained {
     pub channel: String,
     /// Variables with which it varies.
     pub depends_on: Vec<String>,
+    /// Period of a pattern that is locked to the first of them, rad.
+    pub period_rad: Option<f64>,
+    /// Frequency of an oscillation in time, Hz.
+    pub frequency_hz: Option<f64>,
+    /// A free form that takes a part of it off held-out data; no physics, and not in the diagnosed rig.
+    pub free_form: Option<FreeForm>,
     /// One plain sentence.
     pub sentence: String,
+}
+
+/// A curve or wave over one variable, fitted to what is left of the channel named beside it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FreeForm {
+    /// Variable along which it runs.
+    pub variable: String,
+    /// Unit of the variable.
+    pub variable_unit: String,
+    /// Whether it is multiplied with the motor's current, A.
+    pub per_ampere: bool,
+    /// Unit of the channel.
+    pub unit: String,
+    /// Variable and measured minus simulated: nodes with straight lines between them, or one period of a wave. Where it
+    /// depends on the direction of motion, while the input angle grows.
+    pub points: Vec<[f64; 2]>,
+    /// The same while the input angle falls; empty where the direction does not matter.
+    pub points_backwards: Vec<[f64; 2]>,
+    /// Root mean square difference over 10 ms that held-out data have without it, in the channel's unit.
+    pub heldout_rms_before: f64,
+    /// The same with it.
+    pub heldout_rms_after: f64,
+    /// Share of the held-out squares that it takes off, large differences entering with their root.
+    pub heldout_share: f64,
 }
 
 /// Differences of one channel, root mean square, in its unit.
@@ -137,6 +201,30 @@ pub struct Fit {
     pub channels: BTreeMap<String, ChannelFit>,
 }
 
+/// An effect that was tried in one round of the search.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Attempt {
+    /// Identifier.
+    pub id: String,
+    /// Channel, for an effect of a sensor.
+    pub channel: Option<String>,
+    /// Parameters where they were left.
+    pub parameters: BTreeMap<String, f64>,
+    /// Share of the fitted loss that one simulation promised, 0 to 1.
+    pub promised: f64,
+    /// Held-out loss once fitted; `None` where too little was promised.
+    pub heldout_loss: Option<f64>,
+}
+
+/// One round of the search: every effect of the catalogue beside those that were chosen before.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SearchRound {
+    /// Held-out loss before it.
+    pub loss_before: f64,
+    /// What was tried, most promising first.
+    pub tried: Vec<Attempt>,
+}
+
 /// One diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -156,10 +244,14 @@ pub struct Diagnosis {
     pub indistinguishable: Vec<Vec<String>>,
     /// Where the recalibrated simulation differs, largest share first.
     pub mismatch: Vec<Mismatch>,
+    /// The same over position, speed, tension and time.
+    pub residual_map: ResidualMap,
     /// What no named effect explains.
     pub unexplained: Option<Unexplained>,
     /// Scores.
     pub fit: Fit,
+    /// What was tried, round by round.
+    pub search: Vec<SearchRound>,
     /// Name of the rig.
     pub rig: String,
     /// Recordings that were fitted.

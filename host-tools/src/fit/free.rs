@@ -29,8 +29,8 @@ pub struct Free {
     spec: ParameterSpec,
     start: f64,
     size: f64,
-    /// Standard deviation of the prior in the optimiser's coordinate; infinite for none.
-    prior_std: f64,
+    /// Mean and standard deviation of the prior in the optimiser's coordinate; infinite spread for none.
+    prior: (f64, f64),
 }
 
 /// Standard deviation of what a user believes about a nominal parameter: a factor of 1.6 either way. Wide enough that
@@ -47,7 +47,7 @@ impl Free {
         let mut spec = parameter.spec;
         spec.scale = if ratio { Scale::Log } else { Scale::Linear };
         let size = if ratio { 1.0 } else { spec.default.max(start) };
-        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior_std: NOMINAL_PRIOR_STD })
+        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior: (0.0, NOMINAL_PRIOR_STD) })
     }
 
     /// Parameter of an effect of `model`.
@@ -61,7 +61,13 @@ impl Free {
             Scale::Linear if spec.default != 0.0 => spec.default.abs(),
             Scale::Linear => 0.1 * (spec.upper - spec.lower),
         };
-        Some(Self { place: Place::Effect { effect, parameter }, spec, start, size, prior_std: f64::INFINITY })
+        Some(Self {
+            place: Place::Effect { effect, parameter },
+            spec,
+            start,
+            size,
+            prior: (0.0, f64::INFINITY),
+        })
     }
 
     /// The same parameter, measured as a ratio to its start, which must be positive.
@@ -71,6 +77,25 @@ impl Free {
             self.spec.scale = Scale::Log;
             self.size = 1.0;
         }
+        self
+    }
+
+    /// The same parameter with what was believed of it before any recording: a value, and the standard deviation of its
+    /// logarithm, or of its difference in units of its size.
+    #[must_use]
+    pub fn believed_within(mut self, value: f64, spread: f64) -> Self {
+        let mean = match self.spec.scale {
+            Scale::Log if self.start > 0.0 && value > 0.0 => (value / self.start).ln(),
+            _ => (value - self.start) / self.size,
+        };
+        self.prior = (mean, spread);
+        self
+    }
+
+    /// The same parameter with a lower end of its range's upper end.
+    #[must_use]
+    pub fn up_to(mut self, upper: f64) -> Self {
+        self.spec.upper = self.spec.upper.min(upper);
         self
     }
 
@@ -149,7 +174,13 @@ impl Free {
     /// Residual of the prior at `x`; zero where there is none.
     #[must_use]
     pub fn prior_residual(&self, x: f64) -> f64 {
-        x / self.prior_std
+        (x - self.prior.0) / self.prior.1
+    }
+
+    /// Slope of [`Self::prior_residual`].
+    #[must_use]
+    pub fn prior_slope(&self) -> f64 {
+        self.prior.1.recip()
     }
 
     /// Writes the value at `x` into a model.
@@ -187,6 +218,16 @@ pub const VISCOUS: [(&str, &str); 2] = [("motor", "viscous_nm_s_per_rad"), ("loa
 #[must_use]
 pub fn recalibrated(model: &JointModel) -> Vec<Free> {
     RECALIBRATED.iter().filter_map(|(section, name)| Free::nominal(model, section, name)).collect()
+}
+
+/// The same, with what `believed` states as the prior, wherever `model` has got to.
+#[must_use]
+pub fn recalibrated_from(believed: &JointModel, model: &JointModel) -> Vec<Free> {
+    recalibrated(model)
+        .into_iter()
+        .zip(recalibrated(believed))
+        .map(|(free, before)| free.believed_within(before.start, NOMINAL_PRIOR_STD))
+        .collect()
 }
 
 /// The parameters of [`RECALIBRATED`] and [`VISCOUS`] that `model` has.

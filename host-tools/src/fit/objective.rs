@@ -13,6 +13,7 @@
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
+use bowden_model::effect::ActiveEffect;
 
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
@@ -271,6 +272,24 @@ impl Objective {
     /// When the model cannot be driven.
     pub fn residuals(&self, model: &JointModel) -> Result<Residuals, Failure> {
         Ok(self.compare(&self.predict(model)?))
+    }
+
+    /// Residuals where `predictions` are seen with one more effect on sensors whose channels drive nothing.
+    ///
+    /// # Errors
+    /// When the effect cannot be applied.
+    pub fn residuals_seen_through(
+        &self,
+        predictions: &[Prediction],
+        effect: ActiveEffect,
+    ) -> Result<Residuals, Failure> {
+        let seen: Result<Vec<Prediction>, Failure> = self
+            .datasets
+            .iter()
+            .zip(predictions)
+            .map(|(dataset, prediction)| prediction.seen_through(effect, &dataset.input))
+            .collect();
+        Ok(self.compare(&seen?))
     }
 
     /// Residuals of given predictions.

@@ -61,7 +61,7 @@ impl Problem<'_> {
     fn known_column(&self, known: &DMatrix<f64>, j: usize, rows: usize) -> DVector<f64> {
         let data = rows - self.free.len();
         let mut column = known.column(j).rows(0, data).into_owned().resize_vertically(rows, 0.0);
-        column[data + j] = self.free[j].prior_residual(1.0);
+        column[data + j] = self.free[j].prior_slope();
         column
     }
 
@@ -211,7 +211,7 @@ pub fn solve_with_slopes(
             problem.set_params(&x);
         }
         // Farther than this the difference quotients do not lead.
-        let tolerance = if step >= COARSE_STEP { 3e-3 } else { 1e-4 };
+        let tolerance = if step >= COARSE_STEP { 3e-3 } else { 5e-4 };
         let optimiser = LevenbergMarquardt::new()
             .with_patience(patience)
             .with_stepbound(0.5)

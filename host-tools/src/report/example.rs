@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::diagnose::verdict::{
-    ChannelFit, Diagnosis, Estimate, Findings, Fit, Mismatch, NamedEffect, Recalibrated, RegimeResidual,
-    Rival, SCHEMA, Trace, Unexplained, Verdict,
+    ChannelFit, Diagnosis, Estimate, Findings, Fit, FreeForm, MapAxis, MapChannel, Mismatch, NamedEffect,
+    Recalibrated, RegimeResidual, ResidualMap, Rival, SCHEMA, Trace, Unexplained, Verdict,
 };
 
 /// Channels with unit, amplitude, and error of the rig file as a part of it.
@@ -139,14 +139,64 @@ fn diagnosis() -> Diagnosis {
             component: "joint".into(),
             channel: "theta_out_rad".into(),
             depends_on: vec!["theta_out_rad".into(), "torque_out_nm".into()],
+            period_rad: Some(0.233),
+            frequency_hz: None,
+            free_form: Some(FreeForm {
+                variable: "theta_out_rad".into(),
+                variable_unit: "rad".into(),
+                per_ampere: false,
+                unit: "N".into(),
+                points: (0..=32)
+                    .map(|k| 0.233 * f64::from(k) / 32.0)
+                    .map(|x| [x, 1.4 * (27.0 * x + 0.4).sin()])
+                    .collect(),
+                points_backwards: Vec::new(),
+                heldout_rms_before: 1.21,
+                heldout_rms_after: 0.534,
+                heldout_share: 0.805,
+            }),
             sentence: "Close to the end of its travel the joint moves less than the tendons say.".into(),
         }),
+        residual_map: residual_map(),
+        search: Vec::new(),
         fit: Fit { heldout: true, channels: fits.collect() },
         rig: "bench 3, left elbow".into(),
         recordings: vec!["elbow_triangle.mcap".into()],
         heldout: vec!["elbow_triangle.mcap, 8.00 s to 12.00 s".into(), "elbow_triangle.mcap, 30.00 s to 36.00 s".into()],
         complete: true,
         written_by: "bowden 0.1.0".into(),
+    }
+}
+
+/// Twelve bins of four variables; differences grow with the variable, and one bin of speed is empty.
+fn residual_map() -> ResidualMap {
+    let axes = [
+        ("theta_rad", "rad", -0.75, 0.75),
+        ("omega_rad_s", "rad/s", -3.1, 2.9),
+        ("tension_n", "N", 11.0, 62.0),
+        ("t_s", "s", 0.3, 40.0),
+    ];
+    let edges = |low: f64, high: f64| (0..=12).map(|k| low + (high - low) * f64::from(k) / 12.0).collect();
+    let bins = |axis: usize, largest: f64| -> Vec<Option<f64>> {
+        (0..12).map(|k| (axis != 1 || k != 11).then_some(largest * (1.0 + f64::from(k)) / 12.0)).collect()
+    };
+    let over = |largest: f64| (0..axes.len()).map(|axis| bins(axis, largest)).collect();
+    ResidualMap {
+        axes: axes
+            .map(|(variable, unit, low, high)| MapAxis {
+                variable: variable.into(),
+                unit: unit.into(),
+                edges: edges(low, high),
+            })
+            .to_vec(),
+        channels: CHANNELS
+            .map(|(channel, unit, amplitude, error)| MapChannel {
+                channel: channel.into(),
+                unit: unit.into(),
+                before_rmse: over(amplitude * error),
+                after_rmse: over(0.1 * amplitude * error),
+            })
+            .to_vec(),
     }
 }
 

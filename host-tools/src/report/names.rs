@@ -38,6 +38,18 @@ pub(super) fn channel(role: &str) -> String {
     known.into()
 }
 
+/// Variable along which differences are drawn.
+pub(super) fn variable(name: &str) -> String {
+    let known = match name {
+        "theta_rad" => "Position",
+        "omega_rad_s" | "omega_in_rad_s" => "Speed",
+        "tension_n" => "Largest tension",
+        "t_s" => "Time",
+        other => return channel(other),
+    };
+    known.into()
+}
+
 /// Part of the joint.
 pub(super) fn component(name: &str) -> String {
     let known = match name {

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::diagnose::verdict::{Diagnosis, Findings, NamedEffect};
 
-use super::{figures, names};
+use super::{figures, free_form, names};
 
 /// Section on physics.
 pub(super) fn section(findings: &Findings) -> Markup {
@@ -16,24 +16,7 @@ pub(super) fn section(findings: &Findings) -> Markup {
                 p { "No effect of the catalogue is named." }
             }
             @for effect in &diagnosis.effects { (card(effect)) }
-            @if let Some(left) = &diagnosis.unexplained {
-                article.card.left {
-                    h3 { "Left unexplained" }
-                    p { (left.sentence) }
-                    p.facts {
-                        (names::component(&left.component)) ", strongest in "
-                        (names::channel(&left.channel)) " " code { (left.channel) }
-                        @if !left.depends_on.is_empty() {
-                            "; varies with "
-                            @for (i, variable) in left.depends_on.iter().enumerate() {
-                                @if i > 0 { ", " }
-                                code { (variable) }
-                            }
-                        }
-                        "."
-                    }
-                }
-            }
+            @if let Some(left) = &diagnosis.unexplained { (free_form::card(left)) }
             (recalibrated(diagnosis))
             @if !diagnosis.indistinguishable.is_empty() {
                 h3 { "Parameters that these data cannot tell apart" }

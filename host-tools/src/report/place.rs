@@ -52,6 +52,8 @@ fn chain(findings: &Findings) -> Markup {
     let diagnosis = &findings.diagnosis;
     let others = diagnosis.mismatch.iter().map(|m| m.component.as_str());
     let others = others.chain(diagnosis.effects.iter().map(|e| e.component.as_str()));
+    let left = diagnosis.unexplained.as_ref().map(|left| left.component.as_str());
+    let others = others.chain(left);
     let mut parts = PARTS.to_vec();
     for other in others {
         if !parts.contains(&other) {
@@ -65,7 +67,8 @@ fn chain(findings: &Findings) -> Markup {
             @let share: f64 = places.iter().sum();
             @let effects: Vec<&str> =
                 diagnosis.effects.iter().filter(|e| e.component == part).map(|e| e.id.as_str()).collect();
-            li class=(if effects.is_empty() { "part" } else { "part named" }) {
+            @let is_left = left == Some(part);
+            li class=(if effects.is_empty() && !is_left { "part" } else { "part named" }) {
                 strong { (names::component(part)) }
                 (bar(share))
                 span.share {
@@ -73,6 +76,7 @@ fn chain(findings: &Findings) -> Markup {
                     @else { (figures::share(share)) " of the difference" }
                 }
                 @for effect in effects { span.effect { (names::words(effect)) } }
+                @if is_left { span.effect { "Unexplained" } }
             }
         } }
     }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::diagnose::verdict::{Findings, RegimeResidual};
 
-use super::{figures, names};
+use super::{figures, map, names};
 
 /// Names of the three simulations that are compared, with the class that draws each.
 const STAGES: [(&str, &str); 3] =
@@ -56,6 +56,7 @@ pub(super) fn section(findings: &Findings) -> Markup {
                 }
             }
             (by_regime(&findings.regimes))
+            (map::part(findings))
         }
     }
 }

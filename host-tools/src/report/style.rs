@@ -28,7 +28,7 @@ code { font: 0.86em ui-monospace, 'SF Mono', Menlo, Consolas, 'DejaVu Sans Mono'
 .verdict.consistent { background: #00614a; } .verdict.recalibrate { background: #004f7c; }
 .verdict.missing_physics { background: #963f00; } .verdict.unexplained { background: #743a5c; }
 
-table { border-collapse: collapse; width: 100%; margin: 4px 0 8px; font-size: 14px; }
+table { position: relative; border-collapse: collapse; width: 100%; margin: 4px 0 8px; font-size: 14px; }
 caption, .caption { text-align: left; color: var(--quiet); font-size: 14px; padding: 0 0 8px; max-width: none; }
 th, td { text-align: left; vertical-align: middle; padding: 5px 12px 5px 0; border-bottom: 1px solid var(--rule); }
 thead th { color: var(--quiet); font-size: 13px; font-weight: 600; vertical-align: bottom;
@@ -75,6 +75,14 @@ figure { margin: 0; } figcaption { font-weight: 600; }
 .regime figcaption { font-size: 14px; border-bottom: 1px solid var(--rule); margin-bottom: 4px; }
 .regime svg { width: 100%; max-width: 400px; }
 
+.map { margin: 0 0 14px; break-inside: avoid; } .map figcaption { font-size: 14px; }
+.maps { display: grid; grid-template-columns: repeat(auto-fit, minmax(230px, 1fr)); gap: 4px 16px; }
+.maps svg { display: block; width: 100%; max-width: 300px; height: auto; }
+path.before { fill: none; stroke: var(--before); stroke-width: 1.5; stroke-dasharray: 5 3; }
+path.after { fill: none; stroke: var(--after); stroke-width: 1.5; }
+.area { fill: var(--after); fill-opacity: .16; }
+.free-form svg { display: block; width: 100%; max-width: 520px; height: auto; margin-top: 6px; }
+
 .trace { margin: 22px 0 30px; } .trace svg { display: block; width: 100%; height: auto; }
 polyline, line.before, line.after, line.measured { fill: none; stroke-linejoin: round; }
 polyline.measured, line.measured { stroke-width: 3; }
@@ -99,6 +107,7 @@ text.onset { font-weight: 600; }
   .regimes { grid-template-columns: repeat(2, 1fr); gap: 12px 24px; }
   .chain { gap: 18px; } .part { flex-basis: 120px; } .part:nth-child(-n+2)::after { right: -17px; }
   .trace { margin: 8px 0 12px; }
+  .maps { grid-template-columns: repeat(4, 1fr); gap: 2px 8px; }
   main { max-width: none; padding: 0; }
   .verdict { color: #000; border: 2pt solid #000; border-left-width: 8pt; }
   .verdict.verdict { background: none; }
@@ -106,5 +115,13 @@ text.onset { font-weight: 600; }
   .verdict, .card, .part, .trace, .regime, p, tr, #provenance { break-inside: avoid; }
   table, svg { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }
-@media (max-width: 700px) { .verdict .mark { display: none; } section { overflow-x: auto; } }
+@media (max-width: 700px) {
+  main { padding: 12px 12px 32px; }
+  .verdict { padding: 16px 18px; } .verdict .mark { display: none; } h1 { font-size: 22px; }
+  table { display: block; overflow-x: auto; } .caption, caption { display: block; }
+  .trace { overflow-x: auto; } .trace svg { min-width: 900px; }
+  .free-form { overflow-x: auto; } .free-form svg { min-width: 420px; }
+  .part:nth-child(-n+2)::after { content: none; }
+  #provenance dl { grid-template-columns: 1fr; }
+}
 ";

@@ -1,0 +1,214 @@
+//! What is left, as rows of a table: differences of every series over 10 ms beside the variables that they may follow.
+
+use bowden_model::channel::Channel;
+
+use crate::diagnose::place;
+use crate::fit::objective::{Objective, Part, Series, soft};
+use crate::simulation::Prediction;
+
+/// Pieces of a block of the fit that make one row each: 10 ms, so that up to 45 Hz can be told.
+const PIECES: usize = 5;
+
+/// Length of the stretches of which every third judges where something is fitted to each recording by itself, s. The same as
+/// those that a diagnosis holds out.
+const STRETCH_S: f64 = 1.0;
+
+/// Speed at which a direction counts for three quarters, rad/s: an encoder's count a few samples long is no motion.
+const DIRECTION_RAD_S: f64 = 0.05;
+
+/// Something that a difference may depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Variable {
+    /// Angle of the joint, as measured.
+    ThetaOut,
+    /// Angle of the input pulley.
+    ThetaIn,
+    /// Speed of the input pulley.
+    Speed,
+    /// Time since the beginning of the recording.
+    Time,
+    /// Largest of the recorded tensions.
+    Tension,
+    /// Current of the motor, as measured.
+    Current,
+}
+
+impl Variable {
+    /// All of them.
+    const ALL: [Self; 6] =
+        [Self::ThetaOut, Self::ThetaIn, Self::Speed, Self::Time, Self::Tension, Self::Current];
+
+    /// Name in files.
+    #[must_use]
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::ThetaOut => "theta_out_rad",
+            Self::ThetaIn => "theta_in_rad",
+            Self::Speed => "omega_in_rad_s",
+            Self::Time => "t_s",
+            Self::Tension => "tension_n",
+            Self::Current => "i_motor_a",
+        }
+    }
+
+    /// Unit.
+    #[must_use]
+    pub(crate) const fn unit(self) -> &'static str {
+        match self {
+            Self::ThetaOut | Self::ThetaIn => "rad",
+            Self::Speed => "rad/s",
+            Self::Time => "s",
+            Self::Tension => "N",
+            Self::Current => "A",
+        }
+    }
+}
+
+/// Differences of one series.
+#[derive(Clone, Debug)]
+pub(crate) struct Left {
+    /// Series.
+    pub(crate) series: Series,
+    /// Scale of the series, in its unit.
+    pub(crate) scale: f64,
+    /// Measured minus simulated over each row, in scales, about its mean in each recording; not a number where the recording
+    /// lacks the channel. Large ones enter with their root, as in a fit.
+    pub(crate) soft: Vec<f64>,
+    /// The same in the unit of the series, as it is.
+    pub(crate) plain: Vec<f64>,
+}
+
+/// The table.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Samples {
+    /// Number of the recording of each row; rows of one recording follow one another.
+    pub(crate) recording: Vec<usize>,
+    /// Whether the fit has not seen the row.
+    pub(crate) held_out: Vec<bool>,
+    /// Every third second of every recording, for what is fitted to each recording by itself.
+    pub(crate) third_second: Vec<bool>,
+    /// Direction of motion, -1 to 1.
+    pub(crate) direction: Vec<f64>,
+    /// One entry a series.
+    pub(crate) left: Vec<Left>,
+    variables: Vec<Vec<f64>>,
+}
+
+impl Samples {
+    /// Differences between the recordings of `objective` and `predictions`.
+    pub(crate) fn new(objective: &Objective, predictions: &[Prediction]) -> Self {
+        let mut samples = Self { variables: vec![Vec::new(); Variable::ALL.len()], ..Self::default() };
+        for (series, scale) in objective.scales() {
+            let (soft, plain) = (Vec::new(), Vec::new());
+            samples.left.push(Left { series: *series, scale: *scale, soft, plain });
+        }
+        for (recording, prediction) in predictions.iter().enumerate() {
+            samples.append(objective, recording, prediction);
+        }
+        samples
+    }
+
+    /// Number of rows.
+    pub(crate) const fn len(&self) -> usize {
+        self.recording.len()
+    }
+
+    /// Values of a variable; `None` where some recording lacks it.
+    pub(crate) fn variable(&self, variable: Variable) -> Option<&[f64]> {
+        let values = &self.variables[variable as usize];
+        (values.len() == self.len() && values.iter().all(|value| value.is_finite())).then_some(values)
+    }
+
+    /// One series.
+    pub(crate) fn of(&self, series: Series) -> Option<&Left> {
+        self.left.iter().find(|left| left.series == series)
+    }
+
+    fn append(&mut self, objective: &Objective, recording: usize, prediction: &Prediction) {
+        let input = objective.input(recording);
+        let t_s = input.t_s();
+        let first = self.len();
+        let measured = |channel| objective.measured(recording, Series::Channel(channel));
+        let theta_in =
+            input.motion().map(|motion| motion.theta_rad.as_slice()).or(measured(Channel::ThetaIn));
+        let omega = place::speed(objective, recording);
+        let tensions: Vec<&[f64]> =
+            Channel::TENSIONS.iter().filter_map(|channel| measured(*channel)).collect();
+        for block in objective.blocks(recording) {
+            let pieces = PIECES.min(block.end - block.start);
+            for piece in 0..pieces {
+                let at = |piece: usize| block.start + (block.end - block.start) * piece / pieces;
+                let samples = at(piece)..at(piece + 1);
+                let mean = |values: &[f64]| mean(&values[samples.clone()]);
+                let or_none = |values: Option<&[f64]>| values.map_or(f64::NAN, mean);
+                let speed = mean(&omega);
+                let largest = tensions.iter().map(|tension| mean(tension)).fold(f64::NAN, f64::max);
+                let since_s = t_s[samples.start] - t_s[0];
+                self.recording.push(recording);
+                self.held_out.push(block.part == Part::HeldOut);
+                // By the beginning of the block, so that both ways of holding out are one where seconds are held out.
+                self.third_second.push(((t_s[block.start] - t_s[0]) / STRETCH_S) as usize % 3 == 2);
+                self.direction.push((speed / DIRECTION_RAD_S).tanh());
+                let values = [
+                    or_none(measured(Channel::ThetaOut)),
+                    or_none(theta_in),
+                    speed,
+                    since_s,
+                    largest,
+                    or_none(measured(Channel::MotorCurrent)),
+                ];
+                self.variables.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
+                for left in &mut self.left {
+                    let simulated = match left.series {
+                        Series::Channel(channel) => prediction.channel(channel),
+                        Series::Guide => Some(prediction.guide_nm.as_slice()),
+                    };
+                    let difference = objective
+                        .measured(recording, left.series)
+                        .zip(simulated.filter(|values| values.len() == t_s.len()))
+                        .map_or(f64::NAN, |(real, simulated)| mean(real) - mean(simulated));
+                    left.plain.push(difference);
+                }
+            }
+        }
+        for left in &mut self.left {
+            let rows = &mut left.plain[first..];
+            let centre = mean(rows);
+            for value in &mut *rows {
+                *value -= centre;
+            }
+            left.soft.extend(rows.iter().map(|value| soft(value / left.scale)));
+        }
+    }
+}
+
+#[cfg(test)]
+impl Samples {
+    /// A table of one recording of rows 10 ms apart, the joint following the input; every third second is held out.
+    pub(crate) fn of_one_recording(theta_rad: &[f64], current_a: &[f64], left: Vec<Left>) -> Self {
+        let n = theta_rad.len();
+        let t_s: Vec<f64> = (0..n).map(|k| 0.01 * k as f64).collect();
+        let speed: Vec<f64> =
+            (0..n).map(|k| (theta_rad[(k + 1).min(n - 1)] - theta_rad[k.saturating_sub(1)]) / 0.02).collect();
+        let held: Vec<bool> = t_s.iter().map(|t_s| *t_s as usize % 3 == 2).collect();
+        Self {
+            recording: vec![0; n],
+            held_out: held.clone(),
+            third_second: held,
+            direction: speed.iter().map(|speed| (speed / DIRECTION_RAD_S).tanh()).collect(),
+            left,
+            variables: vec![
+                theta_rad.to_vec(),
+                theta_rad.to_vec(),
+                speed,
+                t_s,
+                vec![f64::NAN; n],
+                current_a.to_vec(),
+            ],
+        }
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}

@@ -1,0 +1,284 @@
+//! Free forms: curves and waves over a variable, fitted by linear least squares to rows that a fit may see, and judged on
+//! the others. They say how a difference varies, not why.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::samples::{Samples, Variable};
+
+/// Part of the mean diagonal that is added to each one: a node that no row touches stays at zero.
+const RIDGE: f64 = 1e-3;
+
+/// Seconds between the nodes of a curve over time.
+const TIME_NODE_S: f64 = 3.0;
+
+/// What a curve is multiplied with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Factor {
+    /// Nothing.
+    One,
+    /// One curve as it is, and one that turns its sign with the direction of motion.
+    Direction,
+    /// The motor's current.
+    Current,
+}
+
+/// A free form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Shape {
+    /// Straight lines between evenly spaced nodes.
+    Curve {
+        /// Of what.
+        of: Variable,
+        /// How many; over time as many as its length asks for.
+        nodes: usize,
+        /// Multiplied with what.
+        times: Factor,
+    },
+    /// `Σ a_k sin(k c x) + b_k cos(k c x)` with `waves` terms, or that and a constant, times the current.
+    Wave {
+        /// Of what.
+        of: Variable,
+        /// c, rad per unit of the variable.
+        rate: f64,
+        /// How many.
+        waves: usize,
+        /// Multiplied with what; a wave does not turn with the direction.
+        times: Factor,
+    },
+}
+
+/// How well a free form does on rows that it was not fitted to.
+#[derive(Clone, Debug)]
+pub(crate) struct Fitted {
+    /// Mean square of what was there, in squared scales.
+    pub(crate) before: f64,
+    /// Mean square of what is left.
+    pub(crate) after: f64,
+    /// Value of the form at every row, in scales; zero where it is not defined.
+    pub(crate) form: Vec<f64>,
+    /// Coefficients of the first recording, or of all where one set serves all.
+    pub(crate) coefficients: Vec<f64>,
+    /// Rows that it was judged on.
+    pub(crate) judged: Vec<bool>,
+}
+
+impl Fitted {
+    /// Squared scales that it takes off rows that it has not seen.
+    pub(crate) fn removed(&self) -> f64 {
+        self.before - self.after
+    }
+
+    /// That as a share of what was there.
+    pub(crate) fn share(&self) -> f64 {
+        if self.before > 0.0 { self.removed() / self.before } else { 0.0 }
+    }
+}
+
+impl Shape {
+    /// Variable along which it runs.
+    pub(crate) const fn variable(self) -> Variable {
+        match self {
+            Self::Curve { of, .. } | Self::Wave { of, .. } => of,
+        }
+    }
+
+    /// Whether every recording has its own: clocks start anew.
+    pub(crate) fn is_of_one_recording(self) -> bool {
+        self.variable() == Variable::Time
+    }
+
+    /// Fits the form to `values`, one a row.
+    pub(crate) fn fit(self, samples: &Samples, values: &[f64]) -> Option<Fitted> {
+        let x = samples.variable(self.variable())?;
+        let factor = match self {
+            Self::Curve { times: Factor::Current, .. } | Self::Wave { times: Factor::Current, .. } => {
+                Some(samples.variable(Variable::Current)?)
+            }
+            Self::Curve { times: Factor::Direction, .. } => Some(samples.direction.as_slice()),
+            _ => None,
+        };
+        let alone = self.is_of_one_recording();
+        let judged = if alone { &samples.third_second } else { &samples.held_out };
+        let mut form = vec![0.0; samples.len()];
+        let mut first = None;
+        let mut start = 0;
+        while start < samples.len() {
+            let end = if alone {
+                start + samples.recording[start..].partition_point(|r| *r == samples.recording[start])
+            } else {
+                samples.len()
+            };
+            let ends = ends_of(&x[start..end]);
+            let mut terms = Vec::new();
+            let count = self.count(ends);
+            let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+            let usable = |k: usize| values[k].is_finite();
+            for k in (start..end).filter(|k| usable(*k) && !judged[*k]) {
+                self.terms(x[k], factor.map_or(1.0, |f| f[k]), ends, &mut terms);
+                for &(i, a) in &terms {
+                    right[i] += a * values[k];
+                    for &(j, b) in &terms {
+                        normal[(i, j)] += a * b;
+                    }
+                }
+            }
+            let ridge = RIDGE * normal.trace() / count as f64 + f64::MIN_POSITIVE.sqrt();
+            (0..count).for_each(|i| normal[(i, i)] += ridge);
+            let coefficients = normal.cholesky()?.solve(&right);
+            for k in (start..end).filter(|k| usable(*k)) {
+                self.terms(x[k], factor.map_or(1.0, |f| f[k]), ends, &mut terms);
+                form[k] = terms.iter().map(|&(i, a)| a * coefficients[i]).sum();
+            }
+            first.get_or_insert_with(|| coefficients.iter().copied().collect::<Vec<f64>>());
+            start = end;
+        }
+        let (mut before, mut after, mut rows) = (0.0, 0.0, 0.0);
+        for k in (0..samples.len()).filter(|k| judged[*k] && values[*k].is_finite()) {
+            before += values[k].powi(2);
+            after += (values[k] - form[k]).powi(2);
+            rows += 1.0;
+        }
+        (rows > 0.0).then(|| Fitted {
+            before: before / rows,
+            after: after / rows,
+            form,
+            coefficients: first.unwrap_or_default(),
+            judged: judged.clone(),
+        })
+    }
+
+    /// The form over its variable, for the first recording where each has its own; at direction `direction` for one that
+    /// turns with it, for one ampere for one that grows with the current.
+    pub(crate) fn drawn(self, samples: &Samples, fitted: &Fitted, direction: f64) -> Vec<(f64, f64)> {
+        /// Points of a wave's period.
+        const POINTS: usize = 32;
+        let Some(x) = samples.variable(self.variable()) else { return Vec::new() };
+        let rows = if self.is_of_one_recording() {
+            samples.recording.partition_point(|r| *r == samples.recording[0])
+        } else {
+            samples.len()
+        };
+        let ends = ends_of(&x[..rows]);
+        let (from, to, points) = match self {
+            Self::Curve { .. } => (ends.0, ends.1, self.nodes(ends) - 1),
+            Self::Wave { rate, .. } => (0.0, TAU / rate, POINTS),
+        };
+        let factor =
+            if matches!(self, Self::Curve { times: Factor::Direction, .. }) { direction } else { 1.0 };
+        let mut terms = Vec::new();
+        (0..=points)
+            .map(|point| {
+                let x = from + (to - from) * point as f64 / points.max(1) as f64;
+                self.terms(x, factor, ends, &mut terms);
+                (x, terms.iter().map(|&(i, a)| a * fitted.coefficients[i]).sum())
+            })
+            .collect()
+    }
+
+    fn nodes(self, ends: (f64, f64)) -> usize {
+        match self {
+            Self::Curve { of: Variable::Time, .. } => {
+                (((ends.1 - ends.0) / TIME_NODE_S) as usize + 1).clamp(4, 60)
+            }
+            Self::Curve { nodes, .. } => nodes.max(2),
+            Self::Wave { .. } => 0,
+        }
+    }
+
+    fn count(self, ends: (f64, f64)) -> usize {
+        match self {
+            Self::Curve { times: Factor::Direction, .. } => 2 * self.nodes(ends),
+            Self::Curve { .. } => self.nodes(ends),
+            Self::Wave { waves, times, .. } => 2 * waves + usize::from(times == Factor::Current),
+        }
+    }
+
+    /// Index and value of every term that is not zero at `x`.
+    fn terms(self, x: f64, factor: f64, ends: (f64, f64), terms: &mut Vec<(usize, f64)>) {
+        terms.clear();
+        match self {
+            Self::Wave { rate, waves, times, .. } => {
+                let factor = if times == Factor::Current { factor } else { 1.0 };
+                terms.extend((0..waves).flat_map(|k| {
+                    let (sin, cos) = ((k + 1) as f64 * rate * x).sin_cos();
+                    [(2 * k, factor * sin), (2 * k + 1, factor * cos)]
+                }));
+                if times == Factor::Current {
+                    terms.push((2 * waves, factor));
+                }
+            }
+            Self::Curve { times, .. } => {
+                let nodes = self.nodes(ends);
+                let place = ((x - ends.0) / (ends.1 - ends.0)).clamp(0.0, 1.0) * (nodes - 1) as f64;
+                let node = (place as usize).min(nodes - 2);
+                let share = place - node as f64;
+                let pair = [(node, 1.0 - share), (node + 1, share)];
+                match times {
+                    Factor::One => terms.extend(pair),
+                    Factor::Current => terms.extend(pair.map(|(i, a)| (i, a * factor))),
+                    Factor::Direction => {
+                        terms.extend(pair);
+                        terms.extend(pair.map(|(i, a)| (nodes + i, a * factor)));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Smallest and largest value, never the same.
+pub(super) fn ends_of(x: &[f64]) -> (f64, f64) {
+    let (low, high) =
+        x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    if high > low { (low, high) } else { (low - 0.5, low + 0.5) }
+}
+
+/// Rate, in radians per unit of `x`, of the wave that takes most off `values` when it is multiplied with `weights`; `None` where
+/// nothing can be told.
+///
+/// A periodogram by least squares (Lomb, Astrophys. Space Sci. 39 (1976) 447), for rows at any distance: rates from `from` to
+/// `to` in steps of `step`, then finer about the best.
+pub(super) fn best_rate(rows: &Rows, (from, to): (f64, f64), step: f64) -> Option<f64> {
+    let coarse = scan(rows, from, step, ((to - from) / step) as usize + 1)?;
+    let fine = 0.05 * step;
+    scan(rows, (coarse - step).max(from), fine, 41)
+}
+
+/// What a rate is looked for in, one entry a row.
+pub(super) struct Rows {
+    /// Variable.
+    pub(super) x: Vec<f64>,
+    /// What the wave describes.
+    pub(super) values: Vec<f64>,
+    /// What the wave is multiplied with.
+    pub(super) weights: Vec<f64>,
+}
+
+fn scan(rows: &Rows, from: f64, step: f64, count: usize) -> Option<f64> {
+    let mut wave: Vec<(f64, f64)> = rows.x.iter().map(|x| (from * x).sin_cos()).collect();
+    let turn: Vec<(f64, f64)> = rows.x.iter().map(|x| (step * x).sin_cos()).collect();
+    let mut best: Option<(f64, f64)> = None;
+    for index in 0..count {
+        let (mut ss, mut cc, mut sc, mut sv, mut cv) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let told = rows.values.iter().zip(&rows.weights);
+        for (((sin, cos), (turn_sin, turn_cos)), (value, weight)) in wave.iter_mut().zip(&turn).zip(told) {
+            let (a, b) = (weight * *sin, weight * *cos);
+            ss += a * a;
+            cc += b * b;
+            sc += a * b;
+            sv += a * value;
+            cv += b * value;
+            (*sin, *cos) = (*sin * turn_cos + *cos * turn_sin, *cos * turn_cos - *sin * turn_sin);
+        }
+        let determinant = ss * cc - sc * sc;
+        if determinant > 1e-3 * ss * cc {
+            let gain = (cc * sv * sv - 2.0 * sc * sv * cv + ss * cv * cv) / determinant;
+            if best.is_none_or(|(most, _)| gain > most) {
+                best = Some((gain, from + step * index as f64));
+            }
+        }
+    }
+    best.map(|(_, rate)| rate)
+}
