@@ -43,7 +43,8 @@ pub fn run(options: &Options) -> Result<(), String> {
     }
     let programs = ["--package", "bowden", "--package", "bowden-tests", "--bin", "bowden", "--bin", "prove"];
     process::run(cargo(&["build", "--release"]).args(programs), &[0])?;
-    let mut command = benchmark(&options.handed_on, &built("release", "prove")?, &built("release", "bowden")?)?;
+    let mut command =
+        benchmark(&options.handed_on, &built("release", "prove")?, &built("release", "bowden")?)?;
     let status = command.status().map_err(|error| process::unstarted(&command, &error))?;
     if status.success() {
         Ok(())
