@@ -9,6 +9,7 @@
 
 mod afterwards;
 mod candidates;
+mod constancy;
 mod experiment;
 mod layout;
 mod place;
@@ -39,7 +40,7 @@ use layout::Layout;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use verdict::{
     Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, Recalibrated, SCHEMA, SearchRound,
-    Trace, Verdict,
+    Trace, Unexplained, Verdict,
 };
 
 /// Contacts of each tendon while candidates are tried: as many as keep the trapezoidal error `(μK)² / 12 n²` of its
@@ -108,14 +109,22 @@ pub fn diagnose(
         ..model.clone()
     };
     let selected = select(&objective, &search, asked, progress)?;
-    let last = refine(&objective, &model, &selected, progress)?;
     let before = objective.predict(&model)?;
+    let mut last = refine(&objective, &model, &selected, progress)?;
+    let mut inconstant = None;
+    if selected.chosen.is_empty() {
+        inconstant = constancy::inconstant(&objective, &objective.compare(&before), &last.residuals);
+        if inconstant.is_some() {
+            let free = Layout::of(&model).free(&model, &model);
+            last = solve_in_rounds(&objective, &model, &free, FINAL_PATIENCE, &[])?;
+        }
+    }
     let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
     let after = objective.predict(&last.model)?;
     let searched = objective.predict(&selected.searched)?;
     let stages = Stages { before, recalibrated, after, searched };
     Ok(Case { rig, training, heldout, objective: &objective, model: &model }
-        .report(&selected, &last, &stages))
+        .report(&selected, &last, &stages, inconstant))
 }
 
 /// Contacts that are enough while candidates are tried.
@@ -164,7 +173,13 @@ fn refine(
 }
 
 impl Case<'_> {
-    fn report(&self, selected: &Selected, last: &Solution, stages: &Stages) -> Diagnosed {
+    fn report(
+        &self,
+        selected: &Selected,
+        last: &Solution,
+        stages: &Stages,
+        inconstant: Option<Unexplained>,
+    ) -> Diagnosed {
         let Self { rig, training, heldout, objective, model } = *self;
         let nominal = recalibrated(model);
         let recalibrated_parameters: Vec<Recalibrated> = nominal
@@ -201,7 +216,7 @@ impl Case<'_> {
         }
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let left = objective.compare(&stages.after);
-        let unexplained = unexplained::unexplained(objective, &stages.searched);
+        let unexplained = inconstant.or_else(|| unexplained::unexplained(objective, &stages.searched));
         let wrong =
             recalibrated_parameters.iter().any(|p| (p.fitted / p.nominal - 1.0).abs() > WRONG_PARAMETER);
         let loss_before = objective.mean_loss(&objective.compare(&stages.before), Part::HeldOut);

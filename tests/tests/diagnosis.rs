@@ -186,6 +186,23 @@ fn physics_beyond_the_fixed_list_is_named_where_it_is_asked_for_and_only_there()
 }
 
 #[test]
+fn parameters_that_change_between_recordings_are_told_and_those_of_the_rig_kept() {
+    let changed = Case::new("case", Vec::new(), 109, 1.0).off(Parameter::FrictionCoefficient, 1.5);
+    let as_stated = Case::new("case", Vec::new(), 109, 1.0);
+    let training = recording_of(&changed.train(MotionKind::Lab, SECONDS).unwrap());
+    let heldout = recording_of(&as_stated.heldout(MotionKind::LabHeldout, SECOND_SECONDS, SECONDS).unwrap());
+    let rig = Rig::parse(&as_stated.rig_toml(), "rig.toml").unwrap();
+    let found = diagnose(&rig, &[training], &[heldout], &[], &Quiet).unwrap().findings.diagnosis;
+    let unexplained = found.unexplained.unwrap();
+    assert_eq!((found.verdict, &found.effects[..]), (Verdict::Unexplained, &[][..]));
+    assert_eq!(
+        (unexplained.component.as_str(), &unexplained.depends_on[..]),
+        ("transmission", &["recording".to_owned()][..])
+    );
+    assert!(found.recalibrated.iter().all(|p| p.fitted == p.nominal), "{:?}", found.recalibrated);
+}
+
+#[test]
 fn a_parameter_that_is_not_searched_is_not_reported() {
     // The looseness of a slack tendon keeps its default; what is reported are the parameters that were fitted.
     let case = Case::new("case", vec![ConcealedEffect::drawn("tendon_slack", 1.5, 7).unwrap()], 107, 3.0);
