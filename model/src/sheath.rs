@@ -239,6 +239,8 @@ pub struct Tendon {
     front: [usize; 2],
     /// Slope dT/du of the end tensions at their last move, N/m.
     stiffness_n_per_m: [f64; 2],
+    /// `μK` and `qK` \[N\] at the last move of contacts that give way.
+    friction_before: [f64; 2],
 }
 
 impl Tendon {
@@ -255,6 +257,7 @@ impl Tendon {
             slack_m: [0.0; 2],
             front: [0; 2],
             stiffness_n_per_m: [end_stiffness; 2],
+            friction_before: [-1.0; 2],
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
 };
-use libm::{exp, expm1, pow};
+use libm::{exp, expm1, log};
 
 /// Sheath friction that is higher at low speed: `μ(v) = μ (1 + (ρ - 1) e^{-|v/v_s|^δ})`.
 pub struct SheathStribeckFriction;
@@ -48,7 +48,7 @@ impl Effect for SheathStribeckFriction {
             let speeds = tendon.slip_speeds_m_s();
             for ((law, speed), filtered) in tendon.slip.iter_mut().zip(speeds).zip(filtered) {
                 *filtered += share * (speed - *filtered);
-                let excess = (p[0] - 1.0) * exp(-pow(*filtered / p[1], p[2]));
+                let excess = (p[0] - 1.0) * exp(-exp(p[2] * log(*filtered / p[1])));
                 law.friction_coefficient *= 1.0 + excess;
             }
         }

@@ -15,11 +15,15 @@
 //! Dahl's law has no memory of turning points: a small loop inside a large one does not close exactly, and under a steady
 //! pull a small vibration creeps. Source: P. R. Dahl, Aerospace report TOR-158(3107-18), 1968.
 
-use super::{End, MAX_ELEMENTS, SlipLimits, Tendon, TendonMesh};
+use super::{End, FullSlip, MAX_ELEMENTS, SlipLimits, Tendon, TendonMesh};
 
 /// Largest part of a ladder's own compliance by which a contact beyond its limit may raise it: such a contact, as after
 /// a drop of friction, comes back within a travel of δ.
 const LARGEST_RETURN: f64 = 0.5;
+
+/// Part of the friction between the two limits within which a contact counts as slipping. After a travel of 12 δ all of
+/// them do, and a tendon whose contacts all slip moves on at the cost of its ends.
+const SLIPS: f64 = 1e-5;
 
 /// Segments of a tendon whose passes need little room.
 const SMALL: usize = 9;
@@ -43,7 +47,7 @@ impl Tendon {
             self.slack_m[index] -= taken;
             pull_m -= taken;
         }
-        if pull_m == 0.0 {
+        if pull_m == 0.0 || self.slide(mesh, limits, end, pull_m) {
             return;
         }
         self.fill_in(mesh);
@@ -87,6 +91,7 @@ impl Tendon {
         let mut slopes = [0.0; SEGMENTS];
         let mut denominators = [1.0; SEGMENTS];
         let mut numerator = mesh.compliance_m_per_n[segment(n)];
+        let mut all_slip = true;
         for i in (0..n).rev() {
             let (near, far) = (self.tension_n[segment(i)], self.tension_n[segment(i + 1)]);
             let (down, up) = (limits.ratio[contact(i)], limits.inverse_ratio[contact(i)]);
@@ -95,8 +100,10 @@ impl Tendon {
             let (slope, grip) = if range > 0.0 && near > 0.0 {
                 let above = far - (down * near - offset);
                 let gap = if pulled { above } else { range - above };
+                all_slip &= gap.abs() <= SLIPS * range;
                 (down + (above / range).clamp(0.0, 1.0) * (up - down), gap * decay_per_m)
             } else {
+                all_slip = false;
                 (1.0, 0.0)
             };
             let behind = denominators[i + 1];
@@ -124,6 +131,35 @@ impl Tendon {
             self.slack_m[index] += (floor - tension).max(0.0) * mesh.compliance_m_per_n[segment(j)];
             scaled_rise_n *= slope;
         }
+        let friction = [limits.wrap_friction, limits.offset_n];
+        // Limits that change from step to step would end it at once.
+        let steady = core::mem::replace(&mut self.friction_before, friction) == friction;
+        if all_slip && steady && self.slack_m == [0.0; 2] {
+            self.begin_full_slip(mesh, limits, pulled != from_output);
+        }
+    }
+
+    /// Puts all contacts on their limit, where they are but for [`SLIPS`], without a change of length.
+    fn begin_full_slip(&mut self, mesh: &TendonMesh, limits: &SlipLimits, towards_input: bool) {
+        let steps = if towards_input { &limits.ratio } else { &limits.inverse_ratio };
+        let (mut compliance_m_per_n, mut ratio) = (mesh.compliance_m_per_n[0], 1.0);
+        for (step, compliance) in steps.iter().zip(&mesh.compliance_m_per_n[1..=mesh.elements]) {
+            ratio *= step;
+            compliance_m_per_n += compliance * ratio;
+        }
+        let length_m = self.elongation_m(mesh);
+        self.full_slip = Some(FullSlip {
+            towards_input,
+            wrap_friction: limits.wrap_friction,
+            offset_n: limits.offset_n,
+            compliance_m_per_n,
+            ratio,
+        });
+        self.inner_is_stale = true;
+        self.fill_in(mesh);
+        self.tension_n[0] += (length_m - self.elongation_m(mesh)) / compliance_m_per_n;
+        self.inner_is_stale = true;
+        self.fill_in(mesh);
     }
 }
 
