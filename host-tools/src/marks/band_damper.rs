@@ -13,13 +13,13 @@ use bowden_model::effects::find;
 use rayon::prelude::*;
 
 use super::diagnosed::Case;
-use super::joint_fit::{Compared, Knob, Run, adapted, leave_out};
+use super::joint_fit::{Knob, Run, adapted, leave_out, rmse_of};
 use super::late::late;
-use super::{Mark, Table, columns, listed_recordings, mean, root_mean_square};
+use super::{
+    Mark, RigFile, Table, columns, listed_recordings, mean, rig_file, root_mean_square, standard_deviation,
+};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
-use crate::rig::Rig;
-use crate::simulation::ReplayInput;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "band-friction-damper";
@@ -30,7 +30,7 @@ pub const LIMIT_N: f64 = 2000.0;
 /// Largest error of the friction force as a lever of the band ends, N.
 pub const LEVER_LIMIT_N: f64 = 800.0;
 
-const RIG: (&str, &str) = ("band-damper.toml", include_str!("../../rigs/band-damper.toml"));
+const RIG: RigFile = rig_file!("band-damper.toml");
 
 /// N·m of the rig per newton of the recording.
 const TORQUE_NM_PER_N: f64 = 5e-4;
@@ -125,47 +125,22 @@ pub struct Recordings {
 /// When a file of the data set is missing or unusable.
 pub fn load(data: &Path) -> Result<Recordings, Failure> {
     let folder = data.join(FOLDER);
-    let rig = Rig::parse(RIG.1, &format!("rigs/{}", RIG.0))?;
+    let rig = RIG.parse()?;
+    let compared = [
+        (Channel::TorqueIn, SCALE_N * TORQUE_NM_PER_N),
+        (Channel::F1, 0.5 * SCALE_N * CABLE_N_PER_N),
+        (Channel::F3, 0.5 * SCALE_N * CABLE_N_PER_N),
+    ];
     let full: Result<Vec<Run>, Failure> = listed_recordings(&folder)?
         .into_iter()
         .enumerate()
-        .map(|(group, name)| {
-            let recording = rig.load_recording(&folder.join(format!("{name}.csv")))?;
-            let model = JointModel::from_rig(&rig, &recording)?;
-            let input = ReplayInput::new(&model, &recording)?;
-            let compared = [
-                (Channel::TorqueIn, SCALE_N * TORQUE_NM_PER_N),
-                (Channel::F1, 0.5 * SCALE_N * CABLE_N_PER_N),
-                (Channel::F3, 0.5 * SCALE_N * CABLE_N_PER_N),
-            ];
-            let compared = compared
-                .into_iter()
-                .map(|(channel, scale)| Compared {
-                    channel,
-                    measured: recording.channel(channel).unwrap_or_default().to_vec(),
-                    scale,
-                    from: 0,
-                    free_offset: false,
-                })
-                .collect();
-            Ok(Run { name, group, model, input, compared })
-        })
+        .map(|(group, name)| Run::load(&rig, &folder, name, group, &compared))
         .collect();
     let full = full?;
-    let thinned = full.iter().map(thinned).collect();
+    let thinned = full.iter().map(|run| run.thinned(EVERY, FIT_STEP_S)).collect();
     let shown = shown(data)?;
     let levers = levers(&shown);
     Ok(Recordings { full, thinned, shown, levers })
-}
-
-fn thinned(run: &Run) -> Run {
-    let mut thin = run.clone();
-    thin.input = run.input.thinned(EVERY);
-    thin.model.step_s = FIT_STEP_S;
-    for compared in &mut thin.compared {
-        compared.measured = compared.measured.iter().step_by(EVERY).copied().collect();
-    }
-    thin
 }
 
 /// Round guesses from which every fit starts.
@@ -255,17 +230,14 @@ pub fn with_slip_of_others(recordings: &Recordings, models: &[JointModel], slip:
 /// # Errors
 /// When a model cannot be driven.
 pub fn scores(recordings: &Recordings, models: &[JointModel]) -> Result<Vec<Score>, Failure> {
-    let score = |(run, model): (&Run, &JointModel)| {
-        let model = JointModel { step_s: run.model.step_s, ..model.clone() };
-        match run.rmse(&model)?.as_slice() {
-            [torque_nm, f1_n, f3_n] => Ok(Score {
-                friction_n: torque_nm / TORQUE_NM_PER_N,
-                ends_n: root_mean_square([*f1_n, *f3_n]) / CABLE_N_PER_N,
-            }),
-            _ => Err(Failure::failed(format!("{}: expected friction force and both band ends", run.name))),
-        }
+    let score = |(run, errors): (&Run, Vec<f64>)| match errors.as_slice() {
+        [torque_nm, f1_n, f3_n] => Ok(Score {
+            friction_n: torque_nm / TORQUE_NM_PER_N,
+            ends_n: root_mean_square([*f1_n, *f3_n]) / CABLE_N_PER_N,
+        }),
+        _ => Err(Failure::failed(format!("{}: expected friction force and both band ends", run.name))),
     };
-    recordings.full.par_iter().zip(models).map(score).collect()
+    recordings.full.iter().zip(rmse_of(&recordings.full, models)?).map(score).collect()
 }
 
 /// Root mean square over runs.
@@ -376,20 +348,15 @@ fn same_bench(a: &str, b: &str) -> bool {
     a.starts_with("d1__") == b.starts_with("d1__")
 }
 
-fn about_mean(values: &[f64]) -> f64 {
-    let middle = mean(values.iter().copied());
-    root_mean_square(values.iter().map(|value| value - middle))
-}
-
 /// Lever of each recording from the others of its bench.
 #[must_use]
 pub fn levers(shown: &[Shown]) -> Vec<Lever> {
     /// Time constants that are tried, ms.
     const LAGS_MS: std::ops::RangeInclusive<u32> = 0..=60;
     let late_n = |one: &Shown, lag_s: f64| late(&one.samples[0], &one.samples[2], lag_s);
-    let left_n = |one: &Shown, ratio: f64, lag_s: f64| {
-        let pairs = late_n(one, lag_s).into_iter().zip(&one.samples[1]);
-        about_mean(&pairs.map(|(force, ends)| force - ratio * ends).collect::<Vec<_>>())
+    let left_n = |one: &Shown, ratio: f64, force_n: &[f64]| {
+        let pairs = force_n.iter().zip(&one.samples[1]);
+        standard_deviation(&pairs.map(|(force, ends)| force - ratio * ends).collect::<Vec<_>>())
     };
     let lags_s: Vec<f64> = LAGS_MS.step_by(2).map(|lag_ms| 1e-3 * f64::from(lag_ms)).collect();
     // Ratio of each recording, and what it leaves of the friction force, for every lag.
@@ -399,7 +366,7 @@ pub fn levers(shown: &[Shown]) -> Vec<Lever> {
             let fit = |lag_s: &f64| {
                 let force_n = late_n(one, *lag_s);
                 let ratio = slope(&one.samples[1], &force_n);
-                (ratio, left_n(one, ratio, *lag_s) / about_mean(&force_n))
+                (ratio, left_n(one, ratio, &force_n) / standard_deviation(&force_n))
             };
             lags_s.iter().map(fit).collect()
         })
@@ -414,8 +381,8 @@ pub fn levers(shown: &[Shown]) -> Vec<Lever> {
         Lever {
             ratio: ratio(best),
             lag_s: lags_s[best],
-            errors_n: [left_n(one, ratio(0), 0.0), left_n(one, ratio(best), lags_s[best])],
-            spread_n: about_mean(&one.samples[2]),
+            errors_n: [0, best].map(|lag| left_n(one, ratio(lag), &late_n(one, lags_s[lag]))),
+            spread_n: standard_deviation(&one.samples[2]),
         }
     };
     shown.iter().enumerate().map(|(place, one)| lever(place, one)).collect()
@@ -540,8 +507,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     print(table.to_string());
 
     let case = Case {
-        rig: RIG.0,
-        text: RIG.1,
+        rig: RIG,
         training: vec![
             "d1__char__0.5Hz20lbtension",
             "d1__char__0.5Hz35lbtension",

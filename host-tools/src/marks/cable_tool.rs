@@ -9,16 +9,13 @@ use std::path::Path;
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
-use rayon::prelude::*;
 
 use super::diagnosed::Case;
-use super::joint_fit::{Compared, Fitted, Knob, Run, fit, leave_out};
-use super::{Mark, Table, listed_recordings, root_mean_square};
+use super::joint_fit::{Fitted, Knob, Run, fit, leave_out, rmse_of};
+use super::{Mark, RigFile, Table, listed_recordings, rig_file, root_mean_square};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::recording::ColumnSource;
-use crate::rig::Rig;
-use crate::simulation::ReplayInput;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "davinci-cable-tool";
@@ -30,11 +27,11 @@ pub const LIMIT_RAD: f64 = 0.48 * std::f64::consts::PI / 180.0;
 pub const LIMIT_NM: f64 = 0.0119;
 
 /// Tools and their rigs.
-const RIGS: [(&str, &str); 4] = [
-    ("T4L_2", include_str!("../../rigs/davinci-T4L_2.toml")),
-    ("T4L_4", include_str!("../../rigs/davinci-T4L_4.toml")),
-    ("T4R_5", include_str!("../../rigs/davinci-T4R_5.toml")),
-    ("T5L_3", include_str!("../../rigs/davinci-T5L_3.toml")),
+const RIGS: [(&str, RigFile); 4] = [
+    ("T4L_2", rig_file!("davinci-T4L_2.toml")),
+    ("T4L_4", rig_file!("davinci-T4L_4.toml")),
+    ("T4R_5", rig_file!("davinci-T4R_5.toml")),
+    ("T5L_3", rig_file!("davinci-T5L_3.toml")),
 ];
 
 /// Recordings whose name is not that of a tool: wrist poses of one tool, which a fit cannot tell from `T4L_4`.
@@ -229,46 +226,26 @@ pub fn load(data: &Path, load: Load) -> Result<Recordings, Failure> {
                     "{name}: no rig for its tool, expected T4L_2, T4L_4, T4R_5 or T5L_3"
                 ))
             })?;
-            let (_, text) = RIGS[group];
-            let mut rig = Rig::parse(text, &format!("rigs/davinci-{tool}.toml"))?;
+            let mut rig = RIGS[group].1.parse()?;
             if load == Load::Commanded {
                 rig.columns.channels.retain(|(channel, _)| *channel != Channel::TorqueOut);
                 let source =
                     ColumnSource { column: "load_command_a".to_owned(), scale: -LOAD_NM_PER_A, offset: 0.0 };
                 rig.columns.channels.push((Channel::TorqueOut, source));
             }
-            let recording = rig.load_recording(&folder.join(format!("{name}.csv")))?;
-            let model = JointModel::from_rig(&rig, &recording)?;
-            let input = ReplayInput::new(&model, &recording)?;
-            let from = input.t_s().partition_point(|t_s| t_s - input.t_s()[0] < LEAD_IN_S);
-            let compared = [(Channel::ThetaOut, LIMIT_RAD), (Channel::TorqueIn, LIMIT_NM)]
-                .into_iter()
-                .map(|(channel, scale)| Compared {
-                    channel,
-                    measured: recording.channel(channel).unwrap_or_default().to_vec(),
-                    scale,
-                    from,
-                    free_offset: model.free_offsets.contains(&channel),
-                })
-                .collect();
-            Ok(Run { name, group, model, input, compared })
+            let compared = [(Channel::ThetaOut, LIMIT_RAD), (Channel::TorqueIn, LIMIT_NM)];
+            let mut run = Run::load(&rig, &folder, name, group, &compared)?;
+            let t_s = run.input.t_s();
+            let from = t_s.partition_point(|at_s| at_s - t_s[0] < LEAD_IN_S);
+            for compared in &mut run.compared {
+                compared.from = from;
+            }
+            Ok(run)
         })
         .collect();
     let full = full?;
-    let thinned = full.iter().map(thinned).collect();
+    let thinned = full.iter().map(|run| run.thinned(EVERY, FIT_STEP_S)).collect();
     Ok(Recordings { full, thinned })
-}
-
-/// A run with one sample in [`EVERY`], simulated in steps of that length.
-fn thinned(run: &Run) -> Run {
-    let mut thin = run.clone();
-    thin.input = run.input.thinned(EVERY);
-    thin.model.step_s = FIT_STEP_S;
-    for compared in &mut thin.compared {
-        compared.measured = compared.measured.iter().step_by(EVERY).copied().collect();
-        compared.from = compared.from.div_ceil(EVERY);
-    }
-    thin
 }
 
 /// Errors of one run.
@@ -278,17 +255,6 @@ pub struct Score {
     pub angle_rad: f64,
     /// Input torque, root mean square, N·m.
     pub torque_nm: f64,
-}
-
-/// Errors of a run.
-///
-/// # Errors
-/// When the model cannot be driven.
-pub fn score(run: &Run, model: &JointModel) -> Result<Score, Failure> {
-    match run.rmse(model)?.as_slice() {
-        [angle_rad, torque_nm] => Ok(Score { angle_rad: *angle_rad, torque_nm: *torque_nm }),
-        _ => Err(Failure::failed(format!("{}: expected jaw angle and input torque", run.name))),
-    }
 }
 
 /// Root mean square over runs.
@@ -312,14 +278,11 @@ fn prepared(runs: &Recordings, physics: Physics, calibration: Calibration) -> (R
 
 /// Scores at the recorded rate.
 fn scores_of(runs: &[Run], models: &[JointModel]) -> Result<Vec<Score>, Failure> {
-    runs.par_iter()
-        .zip(models)
-        .map(|(run, model)| {
-            let mut model = model.clone();
-            model.step_s = run.model.step_s;
-            score(run, &model)
-        })
-        .collect()
+    let score = |(run, errors): (&Run, Vec<f64>)| match errors.as_slice() {
+        [angle_rad, torque_nm] => Ok(Score { angle_rad: *angle_rad, torque_nm: *torque_nm }),
+        _ => Err(Failure::failed(format!("{}: expected jaw angle and input torque", run.name))),
+    };
+    runs.iter().zip(rmse_of(runs, models)?).map(score).collect()
 }
 
 /// Scores of all runs, each replayed with the physics fitted to the others.
@@ -404,11 +367,8 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     }
     print(table.to_string());
 
-    let (tool, text) = RIGS[0];
-    let rig = format!("davinci-{tool}.toml");
     let case = Case {
-        rig: &rig,
-        text,
+        rig: RIGS[0].1,
         training: vec!["T4L_2__00", "T4L_2__03", "T4L_2__21"],
         heldout: vec!["T4L_2__42"],
     };

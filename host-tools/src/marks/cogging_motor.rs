@@ -16,7 +16,10 @@ use rayon::prelude::*;
 
 use super::diagnosed::Case;
 use super::late::late;
-use super::{Mark, Table, columns, listed_recordings, mean, root_mean_square};
+use super::{
+    Mark, RigFile, Table, columns, listed_recordings, mean, rig_file, root_mean_square, standard_deviation,
+    unusable,
+};
 use crate::outcome::Failure;
 use crate::reconstruct::Motion;
 
@@ -29,7 +32,7 @@ pub const LIMIT_A: f64 = 0.375;
 /// Largest ripple of the speed in compensated turns over that in uncompensated ones.
 pub const LIMIT_RIPPLE: f64 = 0.6;
 
-const RIG: (&str, &str) = ("odrive-cogging.toml", include_str!("../../rigs/odrive-cogging.toml"));
+const RIG: RigFile = rig_file!("odrive-cogging.toml");
 
 /// Turn over which dry friction builds up after a reversal, rad, as in the simulation of a spindle.
 const PRESLIDING_RAD: f64 = 3e-3;
@@ -41,8 +44,8 @@ const HOMING_S: f64 = 1.0;
 const HARMONICS: std::ops::RangeInclusive<u32> = 1..=100;
 const SMALLEST_A: f64 = 0.05;
 
-/// Time constants of the current's filter that are tried, s.
-const LAGS_S: std::ops::RangeInclusive<u32> = 4..=60;
+/// Time constants of the current's filter that are tried, in steps of [`LAG_STEP_S`]: 0.02 to 0.3 s.
+const LAG_STEPS: std::ops::RangeInclusive<u32> = 4..=60;
 const LAG_STEP_S: f64 = 5e-3;
 
 /// The physics that is fitted.
@@ -174,10 +177,7 @@ pub fn load(data: &Path) -> Result<Recordings, Failure> {
         }
     }
     if maps.is_empty() || turns.is_empty() {
-        let shown = folder.display();
-        return Err(Failure::bad_input(format!(
-            "{shown}: expected maps and turns; name the folder of the data sets"
-        )));
+        return Err(unusable(&folder, "expected maps and turns"));
     }
     Ok(Recordings { turns, maps, harmonics })
 }
@@ -333,6 +333,24 @@ impl Fitted {
     pub fn inertia_a_s2_per_rad(&self) -> Option<f64> {
         self.coefficients.last().copied().filter(|_| self.physics.has_inertia())
     }
+
+    /// What is left of a map about its own mean, root mean square, A.
+    #[must_use]
+    pub fn left_of_map_a(&self, map: &Map) -> f64 {
+        let cogging = self.cogging();
+        let left: Vec<f64> = map
+            .theta_rad
+            .iter()
+            .zip(&map.current_a)
+            .map(|(theta, current)| {
+                let wave = |(cycles, amplitude, phase): &(u32, f64, f64)| {
+                    amplitude * (f64::from(*cycles) * (theta + map.shift_rad) + phase).sin()
+                };
+                current + cogging.iter().map(wave).sum::<f64>()
+            })
+            .collect();
+        standard_deviation(&left)
+    }
 }
 
 impl Turn {
@@ -357,16 +375,18 @@ impl Turn {
                 from = k;
             }
         }
-        let middle = mean(speeds.iter().copied());
-        root_mean_square(speeds.iter().map(|speed| speed - middle)) / middle
+        standard_deviation(&speeds) / mean(speeds.iter().copied())
     }
 }
 
 /// Fits to turns and maps. A map has a current of its own where it holds: dry friction that no motion sets free.
 #[must_use]
 pub fn fit(turns: &[&Turn], maps: &[&Map], harmonics: &[u32], physics: Physics) -> Fitted {
-    let lags: Vec<f64> =
-        if physics.has_lag() { LAGS_S.map(|step| f64::from(step) * LAG_STEP_S).collect() } else { vec![0.0] };
+    let lags: Vec<f64> = if physics.has_lag() {
+        LAG_STEPS.map(|step| f64::from(step) * LAG_STEP_S).collect()
+    } else {
+        vec![0.0]
+    };
     let fits: Vec<(f64, Fitted)> = lags
         .into_par_iter()
         .map(|lag_s| {
@@ -424,7 +444,7 @@ fn least_squares(
             add(&row, *current, weight);
         }
     }
-    let Some(solution) = normal.clone().cholesky().map(|cholesky| cholesky.solve(&right)) else {
+    let Some(solution) = normal.cholesky().map(|cholesky| cholesky.solve(&right)) else {
         return (f64::INFINITY, vec![0.0; own]);
     };
     let loss = square - right.dot(&solution);
@@ -513,8 +533,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     let [_, _, no_lag, .., lag, turns_alone] = by_turn.as_slice() else { return Ok(Vec::new()) };
     for (place, turn) in recordings.turns.iter().enumerate() {
         let evenly = recordings.without(&turn.name, Physics::Lag).error_at_constant_speed_a(turn);
-        let current = mean(turn.current_a.iter().copied());
-        let spread = root_mean_square(turn.current_a.iter().map(|value| value - current));
+        let spread = standard_deviation(&turn.current_a);
         let numbers = [spread, no_lag[place][0], lag[place][0], lag[place][1], turns_alone[place][1], evenly]
             .map(|value| format!("{value:.3}"));
         let ripple = format!("{:.2}", turn.ripple());
@@ -551,8 +570,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     print(table.to_string());
 
     let case = Case {
-        rig: RIG.0,
-        text: RIG.1,
+        rig: RIG,
         training: vec!["slow2__nocomp_0", "slow2_slower__nocomp_0"],
         heldout: vec!["slow2__nocomp_1"],
     };
@@ -569,25 +587,4 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
             limit: LIMIT_RIPPLE,
         },
     ])
-}
-
-impl Fitted {
-    /// What is left of a map about its own mean, root mean square, A.
-    #[must_use]
-    pub fn left_of_map_a(&self, map: &Map) -> f64 {
-        let cogging = self.cogging();
-        let left: Vec<f64> = map
-            .theta_rad
-            .iter()
-            .zip(&map.current_a)
-            .map(|(theta, current)| {
-                let wave = |(cycles, amplitude, phase): &(u32, f64, f64)| {
-                    amplitude * (f64::from(*cycles) * (theta + map.shift_rad) + phase).sin()
-                };
-                current + cogging.iter().map(wave).sum::<f64>()
-            })
-            .collect();
-        let middle = mean(left.iter().copied());
-        root_mean_square(left.iter().map(|value| value - middle))
-    }
 }

@@ -2,39 +2,29 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Table;
+use super::{RigFile, Table};
 use crate::diagnose::diagnose;
 use crate::diagnose::verdict::Diagnosis;
 use crate::outcome::Failure;
-use crate::progress::Progress;
+use crate::progress::Quiet;
 use crate::recording::Recording;
-use crate::rig::Rig;
 
 /// A diagnosis that is to be made: what `bowden diagnose` is given.
 #[derive(Clone, Debug)]
 pub struct Case<'a> {
-    /// Name of the rig file in `rigs/`.
-    pub rig: &'a str,
-    /// Its text.
-    pub text: &'a str,
+    /// The rig.
+    pub rig: RigFile,
     /// Recordings without `.csv`, in the folder of the data set.
     pub training: Vec<&'a str>,
     /// Recordings that judge; none holds out every third second.
     pub heldout: Vec<&'a str>,
 }
 
-struct Silent;
-
-impl Progress for Silent {
-    fn stage(&self, _name: &str, _steps: u64) {}
-    fn advance(&self, _steps: u64) {}
-}
-
 impl Case<'_> {
     /// The command that makes the same diagnosis, without its output folder.
     #[must_use]
     pub fn command(&self) -> String {
-        let mut words = vec![format!("bowden diagnose --rig rigs/{}", self.rig)];
+        let mut words = vec![format!("bowden diagnose --rig rigs/{}", self.rig.name)];
         words.extend(self.training.iter().map(|name| format!("{name}.csv")));
         words.extend((!self.heldout.is_empty()).then(|| "--heldout".to_owned()));
         words.extend(self.heldout.iter().map(|name| format!("{name}.csv")));
@@ -46,13 +36,13 @@ impl Case<'_> {
     /// # Errors
     /// When a file is missing or cannot be used with the rig.
     pub fn diagnose(&self, folder: &Path) -> Result<Diagnosis, Failure> {
-        let rig = Rig::parse(self.text, &format!("rigs/{}", self.rig))?;
+        let rig = self.rig.parse()?;
         let load = |names: &[&str]| -> Result<Vec<Recording>, Failure> {
             let paths = names.iter().map(|name| folder.join(format!("{name}.csv")));
             paths.map(|path: PathBuf| rig.load_recording(&path)).collect()
         };
         let (training, heldout) = (load(&self.training)?, load(&self.heldout)?);
-        Ok(diagnose(&rig, &training, &heldout, &[], &Silent)?.findings.diagnosis)
+        Ok(diagnose(&rig, &training, &heldout, &[], &Quiet)?.findings.diagnosis)
     }
 
     /// Makes the diagnosis and writes command, verdict, named physics and held-out errors.

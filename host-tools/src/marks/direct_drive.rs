@@ -13,12 +13,10 @@ use bowden_model::plant::GRAVITY_M_S2;
 use rayon::prelude::*;
 
 use super::diagnosed::Case;
-use super::joint_fit::{Compared, Knob, Run, adapted, fit};
-use super::{Mark, Table, columns, listed_recordings, mean, root_mean_square};
+use super::joint_fit::{Knob, Run, adapted, fit, rmse_of};
+use super::{Mark, RigFile, Table, columns, listed_recordings, mean, rig_file, root_mean_square};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
-use crate::rig::Rig;
-use crate::simulation::ReplayInput;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "dfki-qdd-pendulum";
@@ -26,7 +24,7 @@ pub const FOLDER: &str = "dfki-qdd-pendulum";
 /// Largest error of the angle, root mean square over both recordings, friction held out, rad.
 pub const LIMIT_RAD: f64 = 0.06;
 
-const RIG: (&str, &str) = ("dfki-qdd-pendulum.toml", include_str!("../../rigs/dfki-qdd-pendulum.toml"));
+const RIG: RigFile = rig_file!("dfki-qdd-pendulum.toml");
 
 /// Swing-up along a planned trajectory, 500 Hz.
 pub const SWING_UP: &str = "ddp";
@@ -113,24 +111,12 @@ fn pendulum(model: &JointModel) -> Vec<Knob> {
 /// When a file of the data set is missing or unusable.
 pub fn load(data: &Path) -> Result<Vec<Run>, Failure> {
     let folder = data.join(FOLDER);
-    let rig = Rig::parse(RIG.1, &format!("rigs/{}", RIG.0))?;
+    let rig = RIG.parse()?;
     listed_recordings(&folder)?
         .into_iter()
         .enumerate()
         .map(|(group, name)| {
-            let recording = rig.load_recording(&folder.join(format!("{name}.csv")))?;
-            let model = JointModel::from_rig(&rig, &recording)?;
-            let mut input = ReplayInput::new(&model, &recording)?;
-            let measured = recording.channel(Channel::ThetaOut).unwrap_or_default().to_vec();
-            input.start_at(measured[0], 0.0);
-            let compared = vec![Compared {
-                channel: Channel::ThetaOut,
-                measured,
-                scale: SCALE_RAD,
-                from: 0,
-                free_offset: false,
-            }];
-            Ok(Run { name, group, model, input, compared })
+            Ok(Run::load(&rig, &folder, name, group, &[(Channel::ThetaOut, SCALE_RAD)])?.from_rest())
         })
         .collect()
 }
@@ -174,10 +160,7 @@ pub fn models(runs: &[Run], physics: Physics, taken: Taken) -> Result<Vec<JointM
 /// # Errors
 /// When a model cannot be driven.
 pub fn errors_rad(runs: &[Run], models: &[JointModel]) -> Result<Vec<f64>, Failure> {
-    runs.iter()
-        .zip(models)
-        .map(|(run, model)| Ok(root_mean_square(run.differences(model)?.concat())))
-        .collect()
+    Ok(rmse_of(runs, models)?.concat())
 }
 
 /// What a recording shows of itself, without any model.
@@ -282,7 +265,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
 
     for (training, heldout) in [(SWING_UP, vec![]), (POSITION_LOOP, vec![]), (SWING_UP, vec![POSITION_LOOP])]
     {
-        let case = Case { rig: RIG.0, text: RIG.1, training: vec![training], heldout };
+        let case = Case { rig: RIG, training: vec![training], heldout };
         case.print(&data.join(FOLDER), &mut print)?;
     }
     Ok(vec![Mark {

@@ -4,6 +4,8 @@
 //! the mounting, one of the group. A group without training recordings keeps the shared value. Weak priors hold what
 //! the recordings do not tell: they pull the shared coordinate to the start and a group to the others.
 
+use std::path::Path;
+
 use bowden_model::channel::Channel;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
@@ -14,6 +16,7 @@ use super::{mean, root_mean_square};
 use crate::fit::free::Free;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
+use crate::rig::Rig;
 use crate::simulation::{ReplayInput, replay};
 
 /// Recorded values of one output and what a difference of one mark is.
@@ -47,6 +50,59 @@ pub struct Run {
 }
 
 impl Run {
+    /// Recording `name` of `folder`, whole, with the joint as `rig` states it; `compared` are outputs and the difference
+    /// of each that counts as 1.
+    ///
+    /// # Errors
+    /// When the file is missing, cannot be used with the rig, or lacks an output.
+    pub fn load(
+        rig: &Rig,
+        folder: &Path,
+        name: String,
+        group: usize,
+        compared: &[(Channel, f64)],
+    ) -> Result<Self, Failure> {
+        let recording = rig.load_recording(&folder.join(format!("{name}.csv")))?;
+        let model = JointModel::from_rig(rig, &recording)?;
+        let input = ReplayInput::new(&model, &recording)?;
+        let compare = |&(channel, scale): &(Channel, f64)| {
+            let measured = recording.channel(channel).map(<[f64]>::to_vec).ok_or_else(|| {
+                Failure::bad_input(format!(
+                    "{}: no column for {}, which is compared; name the folder that holds the data sets",
+                    recording.source(),
+                    channel.role()
+                ))
+            })?;
+            let free_offset = model.free_offsets.contains(&channel);
+            Ok(Compared { channel, measured, scale, from: 0, free_offset })
+        };
+        let compared: Result<Vec<Compared>, Failure> = compared.iter().map(compare).collect();
+        let compared = compared?;
+        Ok(Self { name, group, model, input, compared })
+    }
+
+    /// The same with the joint at rest where the first compared output begins, for joints whose angle is no input.
+    #[must_use]
+    pub fn from_rest(mut self) -> Self {
+        if let Some(first) = self.compared.first().and_then(|compared| compared.measured.first()) {
+            self.input.start_at(*first, 0.0);
+        }
+        self
+    }
+
+    /// One sample in `every`, simulated in steps of `step_s`.
+    #[must_use]
+    pub fn thinned(&self, every: usize, step_s: f64) -> Self {
+        let mut thin = self.clone();
+        thin.input = self.input.thinned(every);
+        thin.model.step_s = step_s;
+        for compared in &mut thin.compared {
+            compared.measured = compared.measured.iter().step_by(every).copied().collect();
+            compared.from = compared.from.div_ceil(every);
+        }
+        thin
+    }
+
     /// Differences simulated minus recorded of every compared output, in its unit.
     ///
     /// # Errors
@@ -355,6 +411,18 @@ pub fn leave_out<K: PartialEq + Sync>(
     let mut models = models?.concat();
     models.sort_by_key(|(index, _)| *index);
     Ok(models.into_iter().map(|(_, model)| model).collect())
+}
+
+/// Root mean square difference of every compared output of every run, each with its joint in `models` and the step of
+/// the run: joints may come from thinned runs.
+///
+/// # Errors
+/// When a model cannot be driven.
+pub fn rmse_of(runs: &[Run], models: &[JointModel]) -> Result<Vec<Vec<f64>>, Failure> {
+    let rmse = |(run, model): (&Run, &JointModel)| {
+        run.rmse(&JointModel { step_s: run.model.step_s, ..model.clone() })
+    };
+    runs.par_iter().zip(models).map(rmse).collect()
 }
 
 /// Joint of a run after a fit of `knobs` to that run alone, everything else as in `model`: what belongs to a mounting

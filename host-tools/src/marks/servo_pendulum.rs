@@ -8,12 +8,10 @@ use std::path::Path;
 use bowden_model::channel::Channel;
 
 use super::diagnosed::Case;
-use super::joint_fit::{Compared, Knob, Run, fit, leave_out};
-use super::{Mark, Table, listed_recordings, mean};
+use super::joint_fit::{Knob, Run, fit, leave_out};
+use super::{Mark, RigFile, Table, listed_recordings, mean, rig_file};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
-use crate::rig::Rig;
-use crate::simulation::ReplayInput;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "bam-xl330-pendulum";
@@ -22,11 +20,11 @@ pub const FOLDER: &str = "bam-xl330-pendulum";
 pub const LIMIT_RAD: f64 = 0.0399;
 
 /// Firmware gain and rig; the files differ in name and gain only.
-const RIGS: [(&str, &str); 4] = [
-    ("kp100", include_str!("../../rigs/xl330-kp100.toml")),
-    ("kp200", include_str!("../../rigs/xl330-kp200.toml")),
-    ("kp400", include_str!("../../rigs/xl330-kp400.toml")),
-    ("kp800", include_str!("../../rigs/xl330-kp800.toml")),
+const RIGS: [(&str, RigFile); 4] = [
+    ("kp100", rig_file!("xl330-kp100.toml")),
+    ("kp200", rig_file!("xl330-kp200.toml")),
+    ("kp400", rig_file!("xl330-kp400.toml")),
+    ("kp800", rig_file!("xl330-kp800.toml")),
 ];
 
 /// Angle error that counts as 1 in the fit, rad.
@@ -133,31 +131,13 @@ pub fn load(data: &Path) -> Result<Vec<Run>, Failure> {
     listed_recordings(&folder)?
         .into_iter()
         .map(|name| {
-            let place = RIGS.iter().position(|(gain, _)| name.contains(gain)).ok_or_else(|| {
+            let group = RIGS.iter().position(|(gain, _)| name.contains(gain)).ok_or_else(|| {
                 Failure::bad_input(format!(
                     "{name}: no rig for its gain, expected kp100, kp200, kp400 or kp800"
                 ))
             })?;
-            let (gain, text) = RIGS[place];
-            let rig = Rig::parse(text, &format!("rigs/xl330-{gain}.toml"))?;
-            let recording = rig.load_recording(&folder.join(format!("{name}.csv")))?;
-            let model = JointModel::from_rig(&rig, &recording)?;
-            let mut input = ReplayInput::new(&model, &recording)?;
-            let measured = recording.channel(Channel::ThetaOut).unwrap_or_default().to_vec();
-            input.start_at(measured[0], 0.0);
-            Ok(Run {
-                name,
-                group: place,
-                model,
-                input,
-                compared: vec![Compared {
-                    channel: Channel::ThetaOut,
-                    measured,
-                    scale: SCALE_RAD,
-                    from: 0,
-                    free_offset: false,
-                }],
-            })
+            let rig = RIGS[group].1.parse()?;
+            Ok(Run::load(&rig, &folder, name, group, &[(Channel::ThetaOut, SCALE_RAD)])?.from_rest())
         })
         .collect()
 }
@@ -275,11 +255,8 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     }
     print(table.to_string());
 
-    let (gain, text) = RIGS[2];
-    let rig = format!("xl330-{gain}.toml");
     let case = Case {
-        rig: &rig,
-        text,
+        rig: RIGS[2].1,
         training: vec!["xl330_kp400_lift_and_drop_10h29m21", "xl330_kp400_sin_sin_10h29m14"],
         heldout: vec!["xl330_kp400_sin_time_square_10h29m37"],
     };
