@@ -39,8 +39,8 @@ use experiment::Shown;
 use layout::Layout;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use verdict::{
-    Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, Recalibrated, SCHEMA, SearchRound,
-    Trace, Unexplained, Verdict,
+    Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, HeldOutLoss, NamedEffect, OrdinaryEffect,
+    Recalibrated, SCHEMA, SearchRound, Trace, Unexplained, Verdict,
 };
 
 /// Contacts of each tendon while candidates are tried: as many as keep the trapezoidal error `(μK)² / 12 n²` of its
@@ -110,13 +110,14 @@ pub fn diagnose(
     };
     let selected = select(&objective, &search, asked, progress)?;
     let before = objective.predict(&model)?;
-    let mut last = refine(&objective, &model, &selected, progress)?;
+    progress.stage("refining", 0);
+    let rounds: &[f64] = if selected.complete { &[FINE_STEP] } else { &[] };
+    let mut last = refine(&objective, &model, &at_full_resolution(&selected.model, &model), rounds)?;
     let mut inconstant = None;
     if selected.chosen.is_empty() {
         inconstant = constancy::inconstant(&objective, &objective.compare(&before), &last.residuals);
         if inconstant.is_some() {
-            let free = Layout::of(&model).free(&model, &model);
-            last = solve_in_rounds(&objective, &model, &free, FINAL_PATIENCE, &[])?;
+            last = refine(&objective, &model, &model, &[])?;
         }
     }
     let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
@@ -149,7 +150,7 @@ pub(crate) struct Stages {
     pub before: Vec<Prediction>,
     pub recalibrated: Vec<Prediction>,
     pub after: Vec<Prediction>,
-    /// With the diagnosed physics and an ordinary contact, at the resolution of the search.
+    /// With the diagnosed physics and what every bench has a little of, at the resolution of the search.
     pub searched: Vec<Prediction>,
 }
 
@@ -157,19 +158,15 @@ fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
     JointModel { elements: model.elements, step_s: model.step_s, ..searched.clone() }
 }
 
-/// Fits the chosen physics at the rig's own resolution to all data that may be fitted; after Ctrl-C only its standard
-/// deviations are still found.
+/// Fits `start`, which is `model` with other values and more effects, to all data that may be fitted; without rounds only its
+/// standard deviations are found.
 fn refine(
     objective: &Objective,
     model: &JointModel,
-    selected: &Selected,
-    progress: &dyn Progress,
+    start: &JointModel,
+    rounds: &[f64],
 ) -> Result<Solution, Failure> {
-    progress.stage("refining", 0);
-    let start = at_full_resolution(&selected.model, model);
-    let free = Layout::of(model).free(model, &start);
-    let rounds: &[f64] = if selected.complete { &[FINE_STEP] } else { &[] };
-    solve_in_rounds(objective, &start, &free, FINAL_PATIENCE, rounds)
+    solve_in_rounds(objective, start, &Layout::of(model).free(model, start), FINAL_PATIENCE, rounds)
 }
 
 impl Case<'_> {
@@ -259,6 +256,19 @@ impl Case<'_> {
             residual_map: residual_map::residual_map(objective, stages),
             unexplained,
             fit: Fit { heldout: true, channels },
+            heldout_loss: HeldOutLoss {
+                before: loss_before,
+                recalibrated: loss_recalibrated,
+                after: loss_after,
+            },
+            ordinary: selected
+                .ordinary
+                .iter()
+                .map(|effect| OrdinaryEffect {
+                    id: effect.descriptor().id.to_owned(),
+                    parameters: values_of(effect),
+                })
+                .collect(),
             search: selected.rounds.iter().map(search_round).collect(),
             rig: rig.name.clone(),
             recordings: training.iter().map(|r| r.source().to_owned()).collect(),
@@ -321,17 +331,16 @@ fn named(
     }
 }
 
+fn values_of(effect: &ActiveEffect) -> BTreeMap<String, f64> {
+    let specs = effect.descriptor().parameters;
+    specs.iter().zip(effect.parameters).map(|(spec, value)| (spec.name.to_owned(), value)).collect()
+}
+
 fn search_round(round: &Round) -> SearchRound {
     let attempt = |Attempted { effect, promised, heldout_loss }: &Attempted| Attempt {
         id: effect.descriptor().id.to_owned(),
         channel: effect.target.name().map(str::to_owned),
-        parameters: effect
-            .descriptor()
-            .parameters
-            .iter()
-            .zip(effect.parameters)
-            .map(|(spec, value)| (spec.name.to_owned(), value))
-            .collect(),
+        parameters: values_of(effect),
         promised: *promised,
         heldout_loss: *heldout_loss,
     };

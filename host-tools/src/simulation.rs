@@ -172,14 +172,7 @@ impl Prediction {
         for (channel, values) in
             seen.channels.iter_mut().filter(|(channel, _)| effect.target.includes(*channel))
         {
-            let mut states = FRESH_STATES;
-            let mut before_s = input.t_s.first().copied().unwrap_or(0.0);
-            for (value, &t_s) in values.iter_mut().zip(&input.t_s) {
-                let mut port = SensorPort { t_s, dt_s: t_s - before_s, value: *value };
-                before_s = t_s;
-                effects.measure(*channel, &mut states, &mut port);
-                *value = port.value;
-            }
+            *values = through(&input.t_s, values, |states, port| effects.measure(*channel, states, port));
         }
         Ok(seen)
     }
@@ -197,7 +190,12 @@ impl Prediction {
 pub fn replay(model: &JointModel, input: &ReplayInput) -> Result<Prediction, Failure> {
     let config = model.plant()?;
     let drive = model.drive()?;
-    let run = Run { model, config: &config, input, drive };
+    let theta_in_rad = input.motion.as_ref().map(|motion| {
+        through(&input.t_s, &motion.theta_rad, |states, port| {
+            config.effects().correct(Channel::ThetaIn, states, port);
+        })
+    });
+    let run = Run { model, config: &config, input, theta_in_rad, drive };
     if drive == Drive::GuidedMotor {
         let no_torque = vec![0.0; input.t_s.len()];
         let first =
@@ -232,6 +230,8 @@ struct Run<'a> {
     model: &'a JointModel,
     config: &'a PlantConfig,
     input: &'a ReplayInput,
+    /// True angle of the input pulley, where it is prescribed.
+    theta_in_rad: Option<Vec<f64>>,
     drive: Drive,
 }
 
@@ -242,9 +242,8 @@ impl Run<'_> {
         let n = input.t_s.len();
         let longest_s = self.model.step_s.min(self.config.stable_step_s());
         let effects = self.config.effects();
-        let theta_in =
-            input.motion.as_ref().map(|m| corrected(effects, Channel::ThetaIn, &input.t_s, &m.theta_rad));
-        let start_rad = theta_in.as_ref().map(|t| t[0]).or(input.start_rad).unwrap_or(0.0);
+        let theta_in = self.theta_in_rad.as_ref();
+        let start_rad = theta_in.map(|t| t[0]).or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
         plant.set_time_s(input.clock_offset_s + input.t_s.first().copied().unwrap_or(0.0));
         if self.drive == Drive::Duty || self.drive == Drive::Servo {
@@ -263,7 +262,7 @@ impl Run<'_> {
                 let dt_s = span_s / steps;
                 for sub in 1..=steps as usize {
                     let share = sub as f64 / steps;
-                    let wanted = theta_in.as_ref().map_or(0.0, |t| t[k - 1] + (t[k] - t[k - 1]) * share);
+                    let wanted = theta_in.map_or(0.0, |t| t[k - 1] + (t[k] - t[k - 1]) * share);
                     let mut step = self.step_input(k - 1, wanted);
                     match self.drive {
                         Drive::GuidedMotor => {
@@ -374,16 +373,65 @@ impl<'a> Sampler<'a> {
     }
 }
 
-fn corrected(effects: &EffectSet, channel: Channel, t_s: &[f64], shown: &[f64]) -> Vec<f64> {
+/// Values of one sensor, sample by sample.
+fn through(
+    t_s: &[f64],
+    values: &[f64],
+    mut sensor: impl FnMut(&mut EffectStates, &mut SensorPort),
+) -> Vec<f64> {
     let mut states = FRESH_STATES;
     let mut before_s = t_s.first().copied().unwrap_or(0.0);
     t_s.iter()
-        .zip(shown)
+        .zip(values)
         .map(|(&t_s, &value)| {
             let mut port = SensorPort { t_s, dt_s: t_s - before_s, value };
             before_s = t_s;
-            effects.correct(channel, &mut states, &mut port);
+            sensor(&mut states, &mut port);
             port.value
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::effect::{Component, Target};
+    use bowden_model::effects::CATALOGUE;
+
+    use super::*;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+
+    /// What screening takes for a simulation with one more sensor effect is that simulation, bit for bit.
+    #[test]
+    fn a_sensor_that_drives_nothing_is_seen_through_without_another_simulation() {
+        let rig = Rig::parse(include_str!("../tests/rigs/bench.toml"), "bench.toml").unwrap();
+        let t_s: Vec<f64> = (0..1500).map(|k| f64::from(k) * 1e-3).collect();
+        let theta_rad: Vec<f64> = t_s.iter().map(|t| 0.4 * (4.0 * t).sin()).collect();
+        let no = vec![0.0; t_s.len()];
+        let mut recording = Recording::new("motion", t_s).with(Channel::ThetaIn, theta_rad);
+        for channel in Channel::TENSIONS.into_iter().chain([Channel::ThetaOut]) {
+            recording.set(channel, no.clone());
+        }
+        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        let input = ReplayInput::new(&model, &recording).unwrap();
+        let plain = replay(&model, &input).unwrap();
+        let sensors = CATALOGUE.iter().filter(|effect| effect.descriptor().component == Component::Sensors);
+        let mut tried = 0;
+        for effect in sensors {
+            let mut active = ActiveEffect::with_defaults(*effect);
+            active.target = Target::One(Channel::F2);
+            if active.descriptor().id == "sensor_saturation" {
+                active = active.with("limit", 31.0);
+            }
+            if !active.descriptor().channels.contains(&Channel::F2) {
+                active.target = Target::One(Channel::ThetaOut);
+            }
+            let with = JointModel { effects: vec![active], ..model.clone() };
+            let simulated = replay(&with, &input).unwrap();
+            assert_ne!(simulated, plain, "{} does nothing", active.descriptor().id);
+            assert_eq!(plain.seen_through(active, &input).unwrap(), simulated, "{}", active.descriptor().id);
+            tried += 1;
+        }
+        assert_eq!(tried, 5);
+    }
 }

@@ -25,6 +25,12 @@ pub fn pulley_torque_constant_nm_per_a(motor: &MotorParameters) -> f64 {
     motor.torque_constant_nm_per_a * motor.gear_ratio
 }
 
+/// Stall torque at the input pulley, `k N V / R`, N·m.
+#[must_use]
+pub fn pulley_stall_torque_nm(motor: &MotorParameters) -> f64 {
+    pulley_torque_constant_nm_per_a(motor) * motor.supply_v / motor.resistance_ohm
+}
+
 /// Rotor inertia referred to the input pulley, `J N²`, kg·m².
 #[must_use]
 pub fn pulley_inertia_kg_m2(motor: &MotorParameters) -> f64 {

@@ -6,10 +6,11 @@
 //! search therefore carries them along at ordinary size, fits them, and names nothing for them: what they take off can no
 //! longer hide a weak effect, nor be mistaken for one. The diagnosed rig does not contain them.
 
+use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 
-use crate::fit::free::{Free, recalibrated_from};
+use crate::fit::free::{Free, recalibrated, recalibrated_from};
 use crate::joint_model::JointModel;
 
 /// An effect that every bench has a little of, told by its first parameter.
@@ -29,7 +30,7 @@ static ORDINARY: [Ordinary; 2] = [
     Ordinary {
         id: "presliding_compliance",
         sizes: |model| {
-            (model.parameters.tendon.is_some() && model.parameters.sheath.is_some()).then_some([1e-5, 2.5e-5])
+            (model.parameters.tendon.is_some() && model.parameters.sheath.is_some()).then_some([1e-5, 4e-5])
         },
         // Inside the play the contacts alone hold the pulley, and under a steady pull Dahl's contact creeps.
         gives_way_to: &["gear_backlash"],
@@ -38,14 +39,28 @@ static ORDINARY: [Ordinary; 2] = [
     Ordinary {
         id: "motor_coulomb_friction",
         sizes: |model| {
-            let motor = model.parameters.motor?;
-            let stall_nm =
-                motor.torque_constant_nm_per_a * motor.gear_ratio * motor.supply_v / motor.resistance_ohm;
+            let stall_nm = pulley_stall_torque_nm(&model.parameters.motor?);
             Some([4e-4, 1e-3].map(|share| share * stall_nm))
         },
         gives_way_to: &[],
     },
 ];
+
+impl Ordinary {
+    /// Whether it has a place beside what was found.
+    fn stands_beside(&self, found: &[ActiveEffect]) -> bool {
+        found.iter().all(|effect| {
+            let id = effect.descriptor().id;
+            id != self.id && !self.gives_way_to.contains(&id)
+        })
+    }
+}
+
+/// Largest strength of an effect that is not worth a name; `None` for one that no bench has of itself.
+pub(super) fn largest_ordinary(believed: &JointModel, id: &str) -> Option<f64> {
+    let ordinary = ORDINARY.iter().find(|ordinary| ordinary.id == id)?;
+    (ordinary.sizes)(believed).map(|[_, largest]| largest)
+}
 
 /// Order of the effects of a searched model.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,25 +76,34 @@ impl Layout {
         Self { own: model.effects.len(), ordinary: Vec::new() }
     }
 
-    /// `model`, which is as a rig states it, with ordinary effects beside what the rig says of them.
+    /// `model` with every ordinary effect that it lacks and that has a place beside what the rig states and what was found.
     pub(super) fn with_ordinary(&self, model: &JointModel) -> (Self, JointModel) {
-        let mut with = model.clone();
-        let mut ordinary = Vec::new();
+        let (mut layout, mut with) = (self.clone(), model.clone());
         for (place, usual) in ORDINARY.iter().enumerate() {
-            let stated = model.effects.iter().any(|effect| effect.descriptor().id == usual.id);
-            if let (false, Some([size, _]), Some(effect)) = (stated, (usual.sizes)(model), find(usual.id)) {
+            let stated = model.effects[..self.own].iter().any(|effect| effect.descriptor().id == usual.id);
+            let found = &model.effects[self.first_found()..];
+            if stated || self.ordinary.contains(&place) || !usual.stands_beside(found) {
+                continue;
+            }
+            if let (Some([size, _]), Some(effect)) = ((usual.sizes)(model), find(usual.id)) {
                 let mut effect = ActiveEffect::with_defaults(effect);
                 effect.parameters[0] = size;
-                with.effects.insert(self.own + ordinary.len(), effect);
-                ordinary.push(place);
+                let index = layout.ordinary.partition_point(|other| *other < place);
+                layout.ordinary.insert(index, place);
+                with.effects.insert(self.own + index, effect);
             }
         }
-        (Self { own: self.own, ordinary }, with)
+        (layout, with)
     }
 
     /// Index of the first effect that the search has found.
-    pub(super) fn first_found(&self) -> usize {
+    fn first_found(&self) -> usize {
         self.own + self.ordinary.len()
+    }
+
+    /// The ordinary effects of `model`.
+    pub(super) fn ordinary<'m>(&self, model: &'m JointModel) -> &'m [ActiveEffect] {
+        &model.effects[self.own..self.first_found()]
     }
 
     /// `model` without the ordinary effects.
@@ -91,17 +115,29 @@ impl Layout {
 
     /// `model` with one more effect, in the last place. More of what is ordinary takes the place of the ordinary.
     pub(super) fn with(&self, model: &JointModel, effect: ActiveEffect) -> (Self, JointModel) {
-        let id = effect.descriptor().id;
         let (mut layout, mut with) = (self.clone(), model.clone());
         for index in (0..self.ordinary.len()).rev() {
-            let ordinary = &ORDINARY[self.ordinary[index]];
-            if ordinary.id == id || ordinary.gives_way_to.contains(&id) {
+            if !ORDINARY[self.ordinary[index]].stands_beside(&[effect]) {
                 layout.ordinary.remove(index);
                 with.effects.remove(self.own + index);
             }
         }
         with.effects.push(effect);
         (layout, with)
+    }
+
+    /// `model` without the found effect `index`; what is ordinary comes back where that had taken its place.
+    pub(super) fn without(&self, model: &JointModel, index: usize) -> (Self, JointModel) {
+        let mut without = model.clone();
+        without.effects.remove(self.first_found() + index);
+        self.with_ordinary(&without)
+    }
+
+    /// Places, among the parameters of [`Self::free`], of the ordinary effects that `other` lacks.
+    pub(super) fn parameters_missing_in(&self, other: &Self, model: &JointModel) -> Vec<usize> {
+        let nominal = recalibrated(model).len();
+        let gone = |(_, place): &(usize, &usize)| !other.ordinary.contains(place);
+        self.ordinary.iter().enumerate().filter(gone).map(|(index, _)| nominal + index).collect()
     }
 
     /// Parameters that a search fits: the nominal ones, believed to be what the rig states, sizes of ordinary effects within
@@ -195,16 +231,36 @@ mod tests {
     }
 
     #[test]
+    fn what_is_ordinary_comes_back_when_more_of_it_turns_out_to_be_superfluous() {
+        let bench = bench();
+        let (ordinary, with) = Layout::of(&bench).with_ordinary(&bench);
+        let (layout, with) = ordinary.with(&with, effect("joint_spring"));
+        let (layout, with) = layout.with(&with, effect("presliding_compliance"));
+        assert_eq!(ids(&with), ["motor_coulomb_friction", "joint_spring", "presliding_compliance"]);
+        // The contact's parameter stood behind the six nominal ones.
+        assert_eq!(ordinary.parameters_missing_in(&layout, &bench), [6]);
+        let (back, without) = layout.without(&with, 1);
+        assert_eq!(ids(&without), ["presliding_compliance", "motor_coulomb_friction", "joint_spring"]);
+        assert_eq!(back, ordinary);
+        assert!(without.effects[0].parameters[0] < 2e-5, "{}", without.effects[0].parameters[0]);
+        let (layout, without) = layout.without(&with, 0);
+        assert_eq!(ids(&without), ["motor_coulomb_friction", "presliding_compliance"]);
+        assert_eq!(layout.first_found(), 1);
+    }
+
+    #[test]
     fn an_ordinary_effect_stays_below_the_size_of_a_finding() {
         let bench = bench();
         let (layout, with) = Layout::of(&bench).with_ordinary(&bench);
         let free = layout.free(&bench, &with);
         let of = |path: &str| *free.iter().find(|free| free.path(&with) == path).unwrap();
         for (path, usual, largest) in [
-            ("presliding_compliance.displacement_m", 1e-5, 2.5e-5),
+            ("presliding_compliance.displacement_m", 1e-5, 4e-5),
             ("motor_coulomb_friction.torque_nm", 4e-4 * STALL_NM, 1e-3 * STALL_NM),
         ] {
             let free = of(path);
+            let limit = largest_ordinary(&bench, path.split('.').next().unwrap()).unwrap();
+            assert!((limit / largest - 1.0).abs() < 1e-9, "{path}: {limit}");
             assert!((free.value_at(0.0) / usual - 1.0).abs() < 1e-9, "{path}");
             assert!((free.value_at(10.0) / largest - 1.0).abs() < 1e-9, "{path}: {}", free.value_at(10.0));
             // Half a standard deviation of the logarithm above the usual size.

@@ -1,13 +1,14 @@
 //! Which effects the data ask for: forward, the best candidate at a time, judged on what the fit has not seen; then
-//! backward, each effect must still be worth its place.
+//! backward, each effect must still be worth its place beside what every bench has a little of.
 
 use bowden_model::effect::ActiveEffect;
+use rayon::prelude::*;
 
 use super::candidates::candidates;
-use super::layout::Layout;
+use super::layout::{Layout, largest_ordinary};
 use super::screening::{Present, screen};
 use crate::fit::objective::{Objective, Part};
-use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds, solve_with_slopes};
+use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_for_ranking, solve_in_rounds};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
@@ -25,10 +26,6 @@ const LOSS_PER_PARAMETER: f64 = 0.03;
 
 /// Strength, as a part of the typical one, below which an effect is not worth a name.
 const NAMED_STRENGTH: f64 = 0.1;
-
-/// Presliding below which a contact is an ordinary one, m: every real contact gives way by about ten micrometres before
-/// it slips.
-const ORDINARY_PRESLIDING_M: f64 = 4e-5;
 
 /// Candidates that are fitted, of those that screening ranks first.
 const FITTED: usize = 7;
@@ -101,6 +98,8 @@ pub struct Selected {
     pub baseline: Solution,
     /// Model that the search ended with: all chosen effects and what is ordinary.
     pub searched: JointModel,
+    /// What is ordinary, as it was last fitted.
+    pub ordinary: Vec<ActiveEffect>,
     /// Model with all chosen effects, as they were last fitted.
     pub model: JointModel,
     /// Chosen effects in the order of the model's new effects.
@@ -151,7 +150,8 @@ pub fn select(
     }
     let model = present.without_ordinary();
     let searched = present.solution.model;
-    Ok(Selected { baseline, searched, model, chosen, rounds, complete: !progress.interrupted() })
+    let ordinary = present.layout.ordinary(&searched).to_vec();
+    Ok(Selected { baseline, searched, ordinary, model, chosen, rounds, complete: !progress.interrupted() })
 }
 
 /// A fitted model, whose effects are whose, and how well it does on held-out data.
@@ -160,6 +160,8 @@ struct Fitted {
     layout: Layout,
     solution: Solution,
     loss: f64,
+    /// Whether it was fitted to the end, and not just as far as a ranking needs.
+    finished: bool,
 }
 
 impl Fitted {
@@ -219,36 +221,55 @@ impl Search<'_> {
             .iter()
             .map(|s| Attempted { effect: s.start, promised: s.gain, heldout_loss: None })
             .collect();
-        let mut fits: Vec<(usize, Fitted)> = Vec::new();
-        for (place, screened) in ranked.iter().enumerate().take(promising) {
-            if progress.interrupted() {
-                break;
-            }
-            fits.push((place, self.fit_new(present, screened.start)?));
-            progress.advance(1);
-        }
+        // One fit by itself leaves threads idle between its rounds of slopes.
+        let fits: Result<Vec<Option<Fitted>>, Failure> = ranked[..promising]
+            .par_iter()
+            .map(|screened| {
+                let fitted =
+                    (!progress.interrupted()).then(|| self.fit_new(present, screened.start)).transpose();
+                progress.advance(1);
+                fitted
+            })
+            .collect();
+        let mut fits: Vec<(usize, Fitted)> =
+            fits?.into_iter().enumerate().filter_map(|(place, fitted)| Some((place, fitted?))).collect();
         let best_first = |fits: &mut Vec<(usize, Fitted)>| {
-            fits.retain(|(_, fitted)| !negligible(&fitted.newest()));
+            fits.retain(|(_, fitted)| !negligible(self.believed, &fitted.newest()));
             fits.sort_by(|(_, a), (_, b)| a.handicapped().total_cmp(&b.handicapped()));
         };
-        let mut keep = |fits: &[(usize, Fitted)]| {
-            for (place, fitted) in fits {
-                record[*place].effect = fitted.newest();
-                record[*place].heldout_loss = Some(fitted.loss);
-            }
+        let mut keep = |place: usize, fitted: &Fitted| {
+            record[place].effect = fitted.newest();
+            record[place].heldout_loss = Some(fitted.loss);
         };
-        keep(&fits);
+        for (place, fitted) in &fits {
+            keep(*place, fitted);
+        }
         best_first(&mut fits);
         let farthest = fits.first().map_or(0.0, |(_, best)| BEHIND * best.loss);
-        for (_, fitted) in fits.iter_mut().take(FINALISTS).filter(|(_, fitted)| fitted.loss <= farthest) {
-            if progress.interrupted() {
-                break;
+        let ahead = fits.iter().take(FINALISTS).take_while(|(_, fitted)| fitted.loss <= farthest).count();
+        fits[..ahead].par_iter_mut().try_for_each(|(_, fitted)| {
+            if !progress.interrupted() {
+                *fitted = self.finish(fitted)?;
             }
-            *fitted = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP])?;
+            Ok::<(), Failure>(())
+        })?;
+        for (place, fitted) in &fits[..ahead] {
+            keep(*place, fitted);
         }
-        keep(&fits);
         best_first(&mut fits);
+        // Finished fits may have fallen behind one that only ranks; what is chosen is fitted to the end.
+        while let Some((place, first)) = fits.first_mut().filter(|(_, first)| !first.finished)
+            && !progress.interrupted()
+        {
+            *first = self.finish(first)?;
+            keep(*place, first);
+            best_first(&mut fits);
+        }
         Ok((record, fits.into_iter().map(|(_, fitted)| fitted).collect()))
+    }
+
+    fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
+        self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP])
     }
 
     /// Removes effects that the later ones have made superfluous.
@@ -259,9 +280,8 @@ impl Search<'_> {
         self.progress.stage("testing each effect again", chosen.len() as u64);
         let mut index = 0;
         while index < chosen.len() && chosen.len() > 1 && !self.progress.interrupted() {
-            let mut without = present.solution.model.clone();
-            without.effects.remove(present.layout.first_found() + index);
-            let rest = self.fit(present.layout.clone(), &without, &[COARSE_STEP, FINE_STEP])?;
+            let (layout, without) = present.layout.without(&present.solution.model, index);
+            let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             self.progress.advance(1);
             if worthwhile(rest.loss, present.loss) {
                 chosen[index].loss_before = rest.loss;
@@ -278,24 +298,23 @@ impl Search<'_> {
     /// `present` with one more effect, fitted only as far as a ranking needs.
     fn fit_new(&self, present: &Fitted, effect: ActiveEffect) -> Result<Fitted, Failure> {
         let (layout, with) = present.layout.with(&present.solution.model, effect);
-        if layout != present.layout {
-            return self.fit(layout, &with, &[COARSE_STEP]);
-        }
         let free = layout.free(self.believed, &with);
-        let known = Some(&present.solution.jacobian);
-        let solution = solve_with_slopes(self.objective, &with, &free, PATIENCE, &[COARSE_STEP], known)?;
-        Ok(self.judged(layout, solution))
+        let gone = present.layout.parameters_missing_in(&layout, self.believed);
+        let known = present.solution.jacobian.clone().remove_columns_at(&gone);
+        let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
+        Ok(self.judged(layout, solution, false))
     }
 
     /// Fits the nominal parameters and those of all effects that the rig itself did not state.
     fn fit(&self, layout: Layout, model: &JointModel, rounds: &[f64]) -> Result<Fitted, Failure> {
         let free = layout.free(self.believed, model);
-        Ok(self.judged(layout, solve_in_rounds(self.objective, model, &free, PATIENCE, rounds)?))
+        let solution = solve_in_rounds(self.objective, model, &free, PATIENCE, rounds)?;
+        Ok(self.judged(layout, solution, true))
     }
 
-    fn judged(&self, layout: Layout, solution: Solution) -> Fitted {
+    fn judged(&self, layout: Layout, solution: Solution, finished: bool) -> Fitted {
         let loss = self.objective.mean_loss(&solution.residuals, Part::HeldOut);
-        Fitted { layout, solution, loss }
+        Fitted { layout, solution, loss, finished }
     }
 }
 
@@ -305,13 +324,15 @@ pub fn worthwhile(before: f64, after: f64) -> bool {
     before - after > WORTHWHILE_LOSS && before - after > WORTHWHILE_SHARE * before
 }
 
-/// Whether an effect was fitted so weak that it is hardly there.
-fn negligible(effect: &ActiveEffect) -> bool {
+/// Whether an effect was fitted so weak that it is hardly there, or no more than every bench has.
+fn negligible(believed: &JointModel, effect: &ActiveEffect) -> bool {
     let descriptor = effect.descriptor();
     let Some(strength) = descriptor.parameters.first() else { return false };
     let value = effect.parameters[0];
+    if largest_ordinary(believed, descriptor.id).is_some_and(|largest| value <= largest) {
+        return true;
+    }
     match descriptor.id {
-        "presliding_compliance" => value < ORDINARY_PRESLIDING_M,
         // Friction that hardly falls with speed is dry friction, which has a name of its own.
         "motor_stribeck_friction" => value < 0.3 * effect.parameters[2].max(strength.default),
         // The typical offset depends on the channel; the loss alone decides.

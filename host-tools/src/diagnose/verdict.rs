@@ -225,6 +225,26 @@ pub struct SearchRound {
     pub tried: Vec<Attempt>,
 }
 
+/// An effect that every bench has a little of: carried along in the search, not named, not in the diagnosed rig.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OrdinaryEffect {
+    /// Identifier.
+    pub id: String,
+    /// Parameters as they were fitted.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// Mean loss on held-out data, in squared scales; 1 where every residual is one scale.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct HeldOutLoss {
+    /// With the rig as it was.
+    pub before: f64,
+    /// With nominal parameters recalibrated.
+    pub recalibrated: f64,
+    /// With the diagnosed physics.
+    pub after: f64,
+}
+
 /// One diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -250,7 +270,11 @@ pub struct Diagnosis {
     pub unexplained: Option<Unexplained>,
     /// Scores.
     pub fit: Fit,
-    /// What was tried, round by round.
+    /// Loss over all channels on held-out data.
+    pub heldout_loss: HeldOutLoss,
+    /// What every bench has a little of, as it was carried along in the search.
+    pub ordinary: Vec<OrdinaryEffect>,
+    /// What was tried, round by round, beside what is ordinary.
     pub search: Vec<SearchRound>,
     /// Name of the rig.
     pub rig: String,

@@ -13,6 +13,7 @@
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
+use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 
 use crate::joint_model::JointModel;
@@ -75,6 +76,8 @@ pub enum Part {
 struct Dataset {
     input: ReplayInput,
     measured: Vec<(Series, Vec<f64>)>,
+    /// Moments of every series of `measured` over every block: a fit compares with them thousands of times.
+    moments: Vec<Vec<Moments>>,
     blocks: Vec<Block>,
     /// Groups of consecutive blocks, as ranges into `blocks`.
     flutter: Vec<std::ops::Range<usize>>,
@@ -297,7 +300,7 @@ impl Objective {
     pub fn compare(&self, predictions: &[Prediction]) -> Residuals {
         let mut values = Vec::new();
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
-            for (series, measured) in &dataset.measured {
+            for ((series, measured), moments_of) in dataset.measured.iter().zip(&dataset.moments) {
                 let scale = self.scale(*series);
                 let predicted = match series {
                     Series::Channel(channel) => prediction.channel(*channel).unwrap_or(&[]),
@@ -306,9 +309,8 @@ impl Objective {
                 let offset = self.offset(*series, dataset, measured, predicted);
                 let noise_variance = self.noise_variance(*series);
                 let mut scatter = Vec::with_capacity(dataset.blocks.len());
-                for block in &dataset.blocks {
-                    let [real, simulated] =
-                        [measured.as_slice(), predicted].map(|v| moments(&v[block.start..block.end]));
+                for (block, real) in dataset.blocks.iter().zip(moments_of) {
+                    let simulated = moments(&predicted[block.start..block.end]);
                     values.push((real.mean - simulated.mean - offset) / scale);
                     scatter.push([real.variance, simulated.variance + noise_variance]);
                 }
@@ -430,7 +432,11 @@ impl Dataset {
                 _ => flutter.push(index..index + 1),
             }
         }
-        Ok(Self { input, measured, blocks, flutter })
+        let moments = measured
+            .iter()
+            .map(|(_, values)| blocks.iter().map(|block| moments(&values[block.start..block.end])).collect())
+            .collect();
+        Ok(Self { input, measured, moments, blocks, flutter })
     }
 }
 
@@ -447,6 +453,7 @@ pub fn soft(residual: f64) -> f64 {
     LOSS_BEND * (2.0 * ((1.0 + z * z).sqrt() - 1.0)).sqrt().copysign(residual)
 }
 
+#[derive(Clone, Copy, Debug)]
 struct Moments {
     mean: f64,
     variance: f64,
@@ -483,11 +490,7 @@ fn scale_of(model: &JointModel, series: Series, noise_variance: f64, datasets: &
         Series::Guide => {
             // Of the stall torque of the motor: what a gear loses unnoticed.
             const SHARE: f64 = 0.0015;
-            let stall_nm = model
-                .parameters
-                .motor
-                .map_or(1.0, |m| m.torque_constant_nm_per_a * m.gear_ratio * m.supply_v / m.resistance_ohm);
-            SHARE * stall_nm
+            SHARE * model.parameters.motor.map_or(1.0, |motor| pulley_stall_torque_nm(&motor))
         }
         Series::Channel(channel) => {
             let floor = match channel {

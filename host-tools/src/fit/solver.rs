@@ -28,7 +28,8 @@ pub struct Solution {
     pub stds: Vec<Option<f64>>,
     /// Residuals of the fitted model.
     pub residuals: Residuals,
-    /// Slopes of the weighted residuals over the optimiser's coordinates, training rows only.
+    /// Slopes of the weighted residuals over the optimiser's coordinates, training rows and priors; empty after a fit that
+    /// only ranks.
     pub jacobian: DMatrix<f64>,
 }
 
@@ -63,6 +64,15 @@ impl Problem<'_> {
         let mut column = known.column(j).rows(0, data).into_owned().resize_vertically(rows, 0.0);
         column[data + j] = self.free[j].prior_slope();
         column
+    }
+
+    /// Standard deviation of a weighted residual, allowing for how long residuals stay alike.
+    fn spread(&self) -> f64 {
+        let rows = self.residuals().unwrap_or_else(|| DVector::zeros(0));
+        let freedom = rows.len() as f64 / CORRELATED_BLOCKS - self.free.len() as f64;
+        let variance = (rows.norm_squared() / freedom.max(1.0)).max(1e-300);
+        let alike = self.current.as_ref().map_or(1.0, |residuals| blocks_alike(self.objective, residuals));
+        (variance * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt()
     }
 
     /// Weighted training residuals followed by the priors.
@@ -164,15 +174,26 @@ pub fn solve_in_rounds(
     patience: usize,
     rounds: &[f64],
 ) -> Result<Solution, Failure> {
-    solve_with_slopes(objective, model, free, patience, rounds, None)
+    solve_knowing(objective, model, free, patience, rounds, None)
 }
 
-/// Like [`solve_in_rounds`], but the slopes over the first parameters are taken from `known`, a fit of the same model
-/// without the last parameters: a third of the simulations, for candidates that are only to be ranked.
+/// Like [`solve_in_rounds`] in one coarse round, but the slopes over the first parameters are taken from `known`, those of a fit
+/// of the same model without the last parameters: a third of the simulations, for candidates that are only to be ranked.
+/// The solution has neither slopes nor standard deviations.
 ///
 /// # Errors
 /// When the model cannot be driven.
-pub fn solve_with_slopes(
+pub fn solve_for_ranking(
+    objective: &Objective,
+    model: &JointModel,
+    free: &[Free],
+    patience: usize,
+    known: &DMatrix<f64>,
+) -> Result<Solution, Failure> {
+    solve_knowing(objective, model, free, patience, &[COARSE_STEP], Some(known))
+}
+
+fn solve_knowing(
     objective: &Objective,
     model: &JointModel,
     free: &[Free],
@@ -193,23 +214,12 @@ pub fn solve_with_slopes(
             jacobian: DMatrix::zeros(0, 0),
         });
     }
-    let mut at_start = Some(start).filter(Residuals::is_finite);
     let mut fixed = vec![false; free.len()];
     let mut x = DVector::zeros(free.len());
+    // Residuals at `x`: no round simulates again where the one before it ended.
+    let mut current = Some(start).filter(Residuals::is_finite);
     for (round, &step) in rounds.iter().enumerate() {
-        let mut problem = Problem {
-            objective,
-            model,
-            free,
-            fixed: &fixed,
-            step,
-            known,
-            x: x.clone(),
-            current: at_start.take(),
-        };
-        if round > 0 {
-            problem.set_params(&x);
-        }
+        let problem = Problem { objective, model, free, fixed: &fixed, step, known, x, current };
         // Farther than this the difference quotients do not lead.
         let tolerance = if step >= COARSE_STEP { 3e-3 } else { 5e-4 };
         let optimiser = LevenbergMarquardt::new()
@@ -219,7 +229,7 @@ pub fn solve_with_slopes(
             .with_xtol(3.0 * tolerance)
             .with_gtol(1e-6);
         let (problem, _report) = optimiser.minimize(problem);
-        x = problem.x;
+        (x, current) = (problem.x, problem.current);
         let mut newly = false;
         for (j, free) in free.iter().enumerate() {
             if !fixed[j] && free.at_bound(free.value_at(x[j])) {
@@ -232,32 +242,22 @@ pub fn solve_with_slopes(
             break;
         }
     }
-    let mut problem = Problem {
-        objective,
-        model,
-        free,
-        fixed: &fixed,
-        step: FINE_STEP,
-        known,
-        x: x.clone(),
-        current: None,
+    let problem = Problem { objective, model, free, fixed: &fixed, step: FINE_STEP, known, x, current };
+    let values: Vec<f64> = free.iter().zip(problem.x.iter()).map(|(free, x)| free.value_at(*x)).collect();
+    let model = problem.model_at(&problem.x);
+    let (jacobian, stds) = if known.is_some() {
+        (DMatrix::zeros(0, 0), vec![None; free.len()])
+    } else {
+        let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
+        let spread = problem.spread();
+        let stds = standard_deviations(&jacobian, &fixed)
+            .into_iter()
+            .zip(free.iter().zip(&values))
+            .map(|(std, (free, value))| std.map(|s| s * spread * free.slope_at(*value)))
+            .collect();
+        (jacobian, stds)
     };
-    problem.set_params(&x);
-    let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
-    let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
-    let rows = problem.residuals().unwrap_or_else(|| DVector::zeros(0));
-    let variance = (rows.norm_squared()
-        / (rows.len() as f64 / CORRELATED_BLOCKS - free.len() as f64).max(1.0))
-    .max(1e-300);
-    let alike = problem.current.as_ref().map_or(1.0, |residuals| blocks_alike(objective, residuals));
-    let spread = (variance * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt();
-    let stds = standard_deviations(&jacobian, &fixed)
-        .into_iter()
-        .zip(free.iter().zip(&values))
-        .map(|(std, (free, value))| std.map(|s| s * spread * free.slope_at(*value)))
-        .collect();
-    let model = problem.model_at(&x);
-    let mut residuals = match problem.current.take() {
+    let mut residuals = match problem.current {
         Some(residuals) => residuals,
         None => objective.residuals(&model)?,
     };
