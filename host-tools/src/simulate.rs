@@ -7,7 +7,7 @@ mod sensing;
 use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect_set::EffectSet;
-use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
 
 use crate::outcome::Failure;
 use crate::recording::Recording;
@@ -122,6 +122,7 @@ pub fn run(rig: &Rig, reference: &Reference, options: RunOptions) -> Result<Reco
         theta_in_rad: start_rad,
         theta_out_rad: 0.0,
         input_torque_nm: 0.0,
+        loose_pulley: Outside::NOTHING,
         external_torque_nm: 0.0,
     };
     plant.settle(&config, &input);

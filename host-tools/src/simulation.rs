@@ -13,7 +13,7 @@ use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::{ActiveEffect, SensorPort};
 use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
-use bowden_model::plant::{Plant, PlantConfig, StepInput};
+use bowden_model::plant::{Outside, Plant, PlantConfig, StepInput};
 
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
@@ -25,6 +25,10 @@ const STIFF_GUIDE_NM_PER_RAD: f64 = 150.0;
 
 /// Stiffness of the guide in the second pass, N·m/rad.
 const SOFT_GUIDE_NM_PER_RAD: f64 = 50.0;
+
+/// Stiffness of the guide on a pulley inside a play of the gear, N·m/rad: that of both tendons or less, so that tensions
+/// there are those of a pulley that nothing turns.
+const PLAY_GUIDE_NM_PER_RAD: f64 = 20.0;
 
 /// Part of the angle's standard deviation within which the guide does not pull.
 const GUIDE_DEAD_BAND: f64 = 0.3;
@@ -272,7 +276,15 @@ impl Run<'_> {
                                 .map_or(0.0, |m| GUIDE_DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
                             let error = plant.theta_in_rad() - wanted;
                             let beyond = error - error.clamp(-band, band);
-                            step.input_torque_nm = guide.ahead_nm[k] - guide.stiffness_nm_per_rad * beyond;
+                            if beyond != 0.0 {
+                                step.loose_pulley.torque_nm = -PLAY_GUIDE_NM_PER_RAD * beyond;
+                                step.loose_pulley.stiffness_nm_per_rad = PLAY_GUIDE_NM_PER_RAD;
+                            }
+                            // The rotor inside a play is not measured; what the pulley does there says nothing of it.
+                            if !plant.inside_gear_play() {
+                                step.input_torque_nm =
+                                    guide.ahead_nm[k] - guide.stiffness_nm_per_rad * beyond;
+                            }
                             torque_sum += step.input_torque_nm / steps;
                         }
                         Drive::Servo => {
@@ -313,6 +325,7 @@ impl Run<'_> {
             theta_in_rad,
             theta_out_rad: 0.0,
             input_torque_nm: 0.0,
+            loose_pulley: Outside::NOTHING,
             // The recorded torque is that of the cables on the joint; the load answers with its negative.
             external_torque_nm: -at(&input.torque_out_nm, 0.0),
         }

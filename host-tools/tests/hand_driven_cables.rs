@@ -8,7 +8,7 @@ use bowden_model::effects::find;
 use bowden_model::parameters::{
     FrictionLaw, JointParameters, PulleyParameters, SensorParameters, SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
 
 const R1_M: f64 = 0.009;
 const R2_M: f64 = 0.010;
@@ -47,6 +47,7 @@ fn turn(config: &PlantConfig, plant: &mut Plant, stops: &[(f64, f64)], dt_s: f64
                 theta_in_rad: from_rad + (to_rad - from_rad) * step as f64 / steps as f64,
                 theta_out_rad: 0.0,
                 input_torque_nm: 0.0,
+                loose_pulley: Outside::NOTHING,
                 external_torque_nm: *load_nm,
             };
             plant.step(config, &input, dt_s);

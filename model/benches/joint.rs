@@ -12,7 +12,7 @@ use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
     SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
 use divan::counter::ItemsCount;
 
 /// Length of the session, s, and simulation step, s.
@@ -73,6 +73,7 @@ fn run(config: &PlantConfig) -> Plant {
             theta_in_rad: 0.0,
             theta_out_rad: 0.0,
             input_torque_nm: 0.0,
+            loose_pulley: Outside::NOTHING,
             external_torque_nm: 0.0,
         };
         plant.step(config, &input, STEP_S);

@@ -214,6 +214,20 @@ fn inertia_kg_m2(load: &LoadParameters, mass_kg: f64) -> f64 {
     mass_kg * load.arm_m * load.arm_m + load.inertia_kg_m2
 }
 
+/// A torque from outside on a pulley without inertia, which must be told together with how it follows the angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outside {
+    /// Torque at the angle where the pulley is, N·m; positive turns it forward.
+    pub torque_nm: f64,
+    /// By how much it falls as the pulley turns forward, N·m/rad, at least 0.
+    pub stiffness_nm_per_rad: f64,
+}
+
+impl Outside {
+    /// Nothing acts.
+    pub const NOTHING: Self = Self { torque_nm: 0.0, stiffness_nm_per_rad: 0.0 };
+}
+
 /// What acts from outside during one step; entries that the boundaries do not use are ignored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepInput {
@@ -223,9 +237,10 @@ pub struct StepInput {
     pub theta_in_rad: f64,
     /// Output pulley at the end of the step, rad.
     pub theta_out_rad: f64,
-    /// Torque from outside on the input pulley, N·m; positive accelerates it. Inside a play of the gear it moves the pulley
-    /// and not the rotor.
+    /// Torque from outside on the rotor, N·m at the input pulley; positive accelerates it.
     pub input_torque_nm: f64,
+    /// What turns the input pulley inside a play of the gear, where the rotor does not touch it.
+    pub loose_pulley: Outside,
     /// Torque from outside on the joint, N·m; positive accelerates it.
     pub external_torque_nm: f64,
 }
@@ -242,6 +257,7 @@ pub struct Plant {
     theta_out_rad: f64,
     omega_out_rad_s: f64,
     gear_offset_rad: f64,
+    inside_gear_play: bool,
     joint_offset_rad: f64,
     spindle_presliding: f64,
     spindle_friction_nm: f64,
@@ -263,6 +279,7 @@ impl Plant {
             theta_out_rad: if config.transmission.is_some() { theta_out_rad } else { theta_in_rad },
             omega_out_rad_s: 0.0,
             gear_offset_rad: 0.0,
+            inside_gear_play: false,
             joint_offset_rad: 0.0,
             spindle_presliding: 0.0,
             spindle_friction_nm: 0.0,
@@ -311,6 +328,12 @@ impl Plant {
     #[must_use]
     pub const fn omega_in_rad_s(&self) -> f64 {
         self.omega_in_rad_s
+    }
+
+    /// Whether the input pulley is inside a play of the gear, where the rotor does not touch it.
+    #[must_use]
+    pub const fn inside_gear_play(&self) -> bool {
+        self.inside_gear_play
     }
 
     /// Joint, rad.
@@ -393,8 +416,11 @@ impl Plant {
         }
         match (config.input, motor) {
             (InputBoundary::Motor, Some(motor)) => {
-                let load_nm =
-                    -self.torque_in_nm(config) - self.rope_loss_nm(config) * Self::pulley_ratio(config);
+                let load_nm = if self.inside_gear_play {
+                    0.0
+                } else {
+                    -self.torque_in_nm(config) - self.rope_loss_nm(config) * Self::pulley_ratio(config)
+                };
                 let play_rad = self.turn_rotor(config, motor, load_nm, input.input_torque_nm, dt_s);
                 let delta_rad = dt_s * self.omega_motor_rad_s;
                 self.theta_motor_rad += delta_rad;
@@ -403,11 +429,12 @@ impl Plant {
                     self.gear_offset_rad = self.relax_play(
                         config,
                         End::Input,
-                        input.input_torque_nm,
+                        input.loose_pulley,
                         self.gear_offset_rad,
                         play_rad,
                     );
                 }
+                self.inside_gear_play = self.gear_offset_rad.abs() < 0.5 * play_rad;
                 let before = self.theta_in_rad;
                 self.theta_in_rad = self.theta_motor_rad - self.gear_offset_rad;
                 self.omega_in_rad_s = (self.theta_in_rad - before) / dt_s;
@@ -556,7 +583,7 @@ impl Plant {
         if port.play_rad > 0.0 || self.joint_offset_rad != 0.0 {
             let before = self.joint_offset_rad.abs();
             self.joint_offset_rad =
-                self.relax_play(config, End::Output, 0.0, self.joint_offset_rad, port.play_rad);
+                self.relax_play(config, End::Output, Outside::NOTHING, self.joint_offset_rad, port.play_rad);
             let half = 0.5 * port.play_rad;
             if self.joint_offset_rad.abs() >= half && before < half {
                 let closing_rad_s = Self::pulley_ratio(config) * self.omega_in_rad_s - self.omega_out_rad_s;
@@ -733,12 +760,12 @@ impl Plant {
         &mut self,
         config: &PlantConfig,
         end: End,
-        outside_nm: f64,
+        outside: Outside,
         offset_rad: f64,
         play_rad: f64,
     ) -> f64 {
         match (&mut self.transmission, &config.transmission) {
-            (Some(state), Some(parts)) => state.relax_play(parts, end, outside_nm, offset_rad, play_rad),
+            (Some(state), Some(parts)) => state.relax_play(parts, end, outside, offset_rad, play_rad),
             _ => 0.0,
         }
     }

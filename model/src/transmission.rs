@@ -7,6 +7,7 @@ use crate::effect::Component;
 use crate::effect::{SlipLaw, TendonPort, TransmissionPort};
 use crate::effect_set::{EffectSet, EffectStates};
 use crate::parameters::{FrictionLaw, PulleyParameters, SheathParameters, TendonParameters};
+use crate::plant::Outside;
 use crate::sheath::{End, SheathError, SlipLimits, Tendon, TendonMesh};
 
 /// Contacts of each tendon unless a rig says otherwise.
@@ -226,12 +227,12 @@ impl Transmission {
         self.turn(config, End::Input, delta_rad);
         if self.play_rad > 0.0 || self.play_offset_rad != 0.0 {
             self.play_offset_rad =
-                self.relax_play(config, End::Input, 0.0, self.play_offset_rad, self.play_rad);
+                self.relax_play(config, End::Input, Outside::NOTHING, self.play_offset_rad, self.play_rad);
         }
     }
 
-    /// Lets a pulley without inertia move inside a play until the cables balance `outside_nm`, a torque on the pulley, or the
-    /// play ends.
+    /// Lets a pulley without inertia move inside a play until the cables balance what acts from `outside`, or the play
+    /// ends.
     ///
     /// `offset_rad` is how far the driving side leads: motor or input pulley before the tendons ([`End::Input`]), output
     /// pulley before the arm ([`End::Output`]). Returns the new lead, within ± half of `play_rad`. The first step assumes
@@ -241,19 +242,24 @@ impl Transmission {
         &mut self,
         config: &TransmissionConfig,
         end: End,
-        outside_nm: f64,
+        outside: Outside,
         offset_rad: f64,
         play_rad: f64,
     ) -> f64 {
         let half = 0.5 * play_rad;
+        let lead_before_rad = offset_rad;
         let mut offset_rad = offset_rad;
         let mut stiffness = config.sticking_stiffness_nm_per_rad(end);
         for _ in 0..PLAY_STEPS {
+            // The input pulley turns back as the lead of the gear grows.
+            let outside_nm =
+                outside.torque_nm + outside.stiffness_nm_per_rad * (offset_rad - lead_before_rad);
             let torque_nm = match end {
                 End::Input => self.torque_in_nm(config) - outside_nm,
                 End::Output => self.torque_out_nm(config) - outside_nm,
             };
-            let wanted = (offset_rad + torque_nm / stiffness).clamp(-half, half);
+            let wanted =
+                (offset_rad + torque_nm / (stiffness + outside.stiffness_nm_per_rad)).clamp(-half, half);
             let moved = wanted - offset_rad;
             if moved == 0.0 {
                 break;

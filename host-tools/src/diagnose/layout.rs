@@ -18,8 +18,6 @@ struct Ordinary {
     id: &'static str,
     /// Usual size in a model, and the largest that is not worth a name; `None` where the model cannot have it.
     sizes: fn(&JointModel) -> Option<[f64; 2]>,
-    /// Effects beside which its law does not hold.
-    gives_way_to: &'static [&'static str],
 }
 
 /// Standard deviation of the logarithm of an ordinary size.
@@ -32,8 +30,6 @@ static ORDINARY: [Ordinary; 2] = [
         sizes: |model| {
             (model.parameters.tendon.is_some() && model.parameters.sheath.is_some()).then_some([1e-5, 4e-5])
         },
-        // Inside the play the contacts alone hold the pulley, and under a steady pull Dahl's contact creeps.
-        gives_way_to: &["gear_backlash"],
     },
     // A part of the stall torque at the input pulley: what bearings and teeth hold back.
     Ordinary {
@@ -42,17 +38,13 @@ static ORDINARY: [Ordinary; 2] = [
             let stall_nm = pulley_stall_torque_nm(&model.parameters.motor?);
             Some([4e-4, 1e-3].map(|share| share * stall_nm))
         },
-        gives_way_to: &[],
     },
 ];
 
 impl Ordinary {
     /// Whether it has a place beside what was found.
     fn stands_beside(&self, found: &[ActiveEffect]) -> bool {
-        found.iter().all(|effect| {
-            let id = effect.descriptor().id;
-            id != self.id && !self.gives_way_to.contains(&id)
-        })
+        found.iter().all(|effect| effect.descriptor().id != self.id)
     }
 }
 
@@ -206,14 +198,6 @@ mod tests {
         let (layout, with) = layout.with(&with, effect("presliding_compliance"));
         assert_eq!(ids(&with), ["motor_coulomb_friction", "presliding_compliance"]);
         assert_eq!(ids(&layout.without_ordinary(&with)), ["presliding_compliance"]);
-    }
-
-    #[test]
-    fn a_contact_that_creeps_is_left_out_beside_a_play_of_the_gear() {
-        let bench = bench();
-        let (layout, with) = Layout::of(&bench).with_ordinary(&bench);
-        let (_, with) = layout.with(&with, effect("gear_backlash"));
-        assert_eq!(ids(&with), ["motor_coulomb_friction", "gear_backlash"]);
     }
 
     #[test]

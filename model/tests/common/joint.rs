@@ -7,7 +7,9 @@ use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, PulleyParameters, SensorParameters, SheathParameters,
     TendonParameters,
 };
-use bowden_model::plant::{GRAVITY_M_S2, InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{
+    GRAVITY_M_S2, InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput,
+};
 
 pub const RADIUS_M: f64 = 0.015;
 pub const MASS_KG: f64 = 1.5;
@@ -48,6 +50,7 @@ pub const IDLE: StepInput = StepInput {
     theta_in_rad: 0.0,
     theta_out_rad: 0.0,
     input_torque_nm: 0.0,
+    loose_pulley: Outside::NOTHING,
     external_torque_nm: 0.0,
 };
 

@@ -1,13 +1,13 @@
 //! Signatures of the motor's effects.
 
-use crate::joint::{IDLE, RADIUS_M, Run, joint};
+use crate::joint::{IDLE, RADIUS_M, Run, STIFFNESS_N_PER_M, joint};
 use crate::motor::{MOTOR, PULLEY_INERTIA_KG_M2, PULLEY_NM_PER_A};
 use crate::near::near;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 use bowden_model::parameters::JointParameters;
-use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, StepInput};
 
 fn effect(id: &str) -> ActiveEffect {
     ActiveEffect::with_defaults(find(id).unwrap())
@@ -144,11 +144,38 @@ fn inside_a_play_the_pulley_gives_way_and_not_the_rotor() {
     let mut run = Run::new(parameters, &[effect("gear_backlash")], boundaries, 5e-4);
     for outside_nm in [0.1, -0.05, 0.1] {
         let until_s = run.plant.t_s() + 0.5;
-        run.until(until_s, |_| StepInput { input_torque_nm: outside_nm, ..duty(0.0) });
+        let loose_pulley = Outside { torque_nm: outside_nm, stiffness_nm_per_rad: 0.0 };
+        run.until(until_s, |_| StepInput { loose_pulley, ..duty(0.0) });
         near("torque of the cables", run.plant.torque_in_nm(&run.config), outside_nm, 1e-6);
         near("rotor", run.plant.theta_motor_rad(), 0.0, 1e-9);
         let turned_rad = run.plant.theta_in_rad();
         assert!(turned_rad * outside_nm > 0.0 && turned_rad.abs() < 0.01, "turned by {turned_rad} rad");
+    }
+}
+
+/// A spring from outside, ten times as stiff as both tendons, holds the pulley inside the play where the cables balance it;
+/// taken as a torque of the step before it would throw the pulley from one side of the play to the other.
+#[test]
+fn inside_a_play_a_stiff_spring_holds_the_pulley() {
+    const SPRING_NM_PER_RAD: f64 = 10.0 * 2.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M;
+    let mut parameters = joint(0.0);
+    parameters.motor = Some(MOTOR);
+    let boundaries = (InputBoundary::Motor, OutputBoundary::Angle);
+    let mut run = Run::new(parameters, &[effect("gear_backlash")], boundaries, 5e-4);
+    for target_rad in [0.004, -0.003, 0.002] {
+        let mut before_nm = f64::INFINITY;
+        for _ in 0..200 {
+            let torque_nm = SPRING_NM_PER_RAD * (target_rad - run.plant.theta_in_rad());
+            let loose_pulley = Outside { torque_nm, stiffness_nm_per_rad: SPRING_NM_PER_RAD };
+            run.plant.step(&run.config, &StepInput { loose_pulley, ..duty(0.0) }, 5e-4);
+            let left_nm = (SPRING_NM_PER_RAD * (target_rad - run.plant.theta_in_rad())
+                - run.plant.torque_in_nm(&run.config))
+            .abs();
+            assert!(left_nm <= before_nm + 1e-9, "{left_nm} N·m after {before_nm} N·m");
+            before_nm = left_nm;
+        }
+        assert!(before_nm < 1e-6, "{before_nm} N·m out of balance");
+        near("rotor", run.plant.theta_motor_rad(), 0.0, 1e-9);
     }
 }
 

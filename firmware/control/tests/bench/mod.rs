@@ -15,7 +15,7 @@ use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
     SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
 
 /// Queues into the tick.
 #[derive(Default)]
@@ -163,6 +163,7 @@ impl Bench {
             theta_in_rad: 0.0,
             theta_out_rad: 0.0,
             input_torque_nm: 0.0,
+            loose_pulley: Outside::NOTHING,
             external_torque_nm: 0.0,
         };
         for _ in 0..steps {

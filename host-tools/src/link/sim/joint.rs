@@ -10,7 +10,7 @@ use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, MotorParameters, NOMINAL_PARAMETERS, PulleyParameters,
     SensorParameters, SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -76,6 +76,7 @@ impl SimJoint {
             theta_in_rad: 0.0,
             theta_out_rad: 0.0,
             input_torque_nm: 0.0,
+            loose_pulley: Outside::NOTHING,
             external_torque_nm: 0.0,
         };
         plant.settle(&config, &input);
