@@ -166,6 +166,15 @@ impl Prediction {
         self.channels.iter().find(|(c, _)| *c == channel).map(|(_, values)| values.as_slice())
     }
 
+    /// Cuts a channel at zero, as a sensor does that cannot read less.
+    pub fn cut_below_zero(&mut self, channel: Channel) {
+        for (_, values) in self.channels.iter_mut().filter(|(c, _)| *c == channel) {
+            for value in values {
+                *value = value.max(0.0);
+            }
+        }
+    }
+
     /// The same joint seen with one more effect on its sensors, in the last place.
     ///
     /// # Errors

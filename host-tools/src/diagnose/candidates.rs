@@ -301,7 +301,8 @@ fn saturation_start(base: ActiveEffect, objective: &Objective) -> Option<ActiveE
     Some(base.with("limit", largest))
 }
 
-/// Stops at nine tenths and seven tenths of the travel, on both sides.
+/// Hard and soft stops at some parts of the travel, on both sides: into a soft one the arm goes far, and from a hard one at
+/// the end of the travel no fit finds the way there.
 fn end_stop_starts(base: ActiveEffect, model: &JointModel, objective: &Objective) -> Vec<ActiveEffect> {
     let channel =
         if model.outputs.contains(&Channel::ThetaOut) { Channel::ThetaOut } else { Channel::ThetaIn };
@@ -311,9 +312,12 @@ fn end_stop_starts(base: ActiveEffect, model: &JointModel, objective: &Objective
         .copied()
         .collect();
     let (low, high) = travel.iter().fold((0.0_f64, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
-    [0.95, 0.8, 0.6]
+    [(0.95, 20.0), (0.8, 20.0), (0.8, 3.0), (0.6, 3.0)]
         .iter()
-        .flat_map(|share| [base.with("stop_rad", share * high), base.with("stop_rad", share * low)])
+        .flat_map(|(share, stiffness_nm_per_rad)| {
+            let base = base.with("stiffness_nm_per_rad", *stiffness_nm_per_rad);
+            [base.with("stop_rad", share * high), base.with("stop_rad", share * low)]
+        })
         .filter(|start| start.parameters[1].abs() > 1e-3)
         .collect()
 }

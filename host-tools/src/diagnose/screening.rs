@@ -20,9 +20,12 @@ use crate::simulation::Prediction;
 /// Candidates whose estimated strength is simulated, of those that the estimate ranks first.
 const VERIFIED: usize = 10;
 
-/// Strengths, in starting strengths, between which the linear estimate is trusted, and as far on the other side for what
-/// has either sign.
-const TRUSTED: std::ops::RangeInclusive<f64> = 0.15..=3.0;
+/// Strength, in starting strengths, below which the linear estimate is not followed, on either side for what has either
+/// sign: such an effect is hardly there.
+const WEAKEST: f64 = 0.15;
+
+/// Strength, in starting strengths, up to which the linear estimate is followed.
+const STRONGEST: f64 = 3.0;
 
 /// A candidate after screening.
 #[derive(Clone, Debug)]
@@ -132,18 +135,16 @@ impl Background<'_> {
         let direction = &there - now;
         let along = direction.norm_squared();
         let step = if along > 0.0 { -now.dot(&direction) / along } else { 0.0 };
-        let linear =
-            start.descriptor().neutral.filter(|_| TRUSTED.contains(&step.abs())).and_then(|neutral| {
-                let spec = start.descriptor().parameters[0];
-                let mut moved = start;
-                moved.parameters[0] = neutral + step * (start.parameters[0] - neutral);
-                let possible = step > 0.0 || moved.parameters[0] >= spec.lower;
-                moved.parameters[0] = moved.parameters[0].clamp(spec.lower, spec.upper);
-                possible.then(|| Screened {
-                    start: moved,
-                    gain: gain_of((now + direction * step).norm_squared()),
-                })
-            });
+        let step = step.clamp(-STRONGEST, STRONGEST);
+        let linear = start.descriptor().neutral.filter(|_| step.abs() >= WEAKEST).and_then(|neutral| {
+            let spec = start.descriptor().parameters[0];
+            let mut moved = start;
+            moved.parameters[0] = neutral + step * (start.parameters[0] - neutral);
+            let possible = step > 0.0 || moved.parameters[0] >= spec.lower;
+            moved.parameters[0] = moved.parameters[0].clamp(spec.lower, spec.upper);
+            possible
+                .then(|| Screened { start: moved, gain: gain_of((now + direction * step).norm_squared()) })
+        });
         Some(Judged { start: at_start, linear })
     }
 
@@ -185,5 +186,50 @@ impl Basis {
         let inside = self.0.transpose() * &extended;
         extended -= &self.0 * inside;
         extended
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effects::find;
+
+    use super::*;
+    use crate::fit::solver::solve_in_rounds;
+    use crate::joint_model::JointModel;
+    use crate::progress::Quiet;
+    use crate::recording::Recording;
+    use crate::rig::Rig;
+    use crate::simulation::{ReplayInput, replay};
+
+    /// What an effect of either sign is tried at says where it really is, on the other side and beyond what is trusted.
+    #[test]
+    fn a_strong_effect_is_promised_on_the_other_side_of_its_start() {
+        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
+        let t_s: Vec<f64> = (0..6000).map(|k| f64::from(k) * 1e-3).collect();
+        let theta_rad: Vec<f64> = t_s.iter().map(|t| 0.4 * (4.0 * t).sin()).collect();
+        let mut recording = Recording::new("motion", t_s.clone()).with(Channel::ThetaIn, theta_rad);
+        for channel in Channel::TENSIONS.into_iter().chain([Channel::ThetaOut]) {
+            recording.set(channel, vec![0.0; t_s.len()]);
+        }
+        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        let start = ActiveEffect::with_defaults(find("asymmetric_friction").unwrap());
+        let strong = -1.1 * STRONGEST * start.parameters[0];
+        let mut real = model.clone();
+        real.effects.push(start.with("asymmetry", strong));
+        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let layout = Layout::of(&model);
+        let free = layout.free(&model, &model);
+        let solution = solve_in_rounds(&objective, &model, &free, 1, &[]).unwrap();
+        let predictions = objective.predict(&model).unwrap();
+        let present = Present { solution: &solution, layout: &layout, predictions: &predictions };
+        let screened = screen(&objective, &present, &[Candidate { starts: vec![start] }], &Quiet);
+        let found = &screened[0];
+        assert!((found.start.parameters[0] / strong - 1.0).abs() < 0.3, "{:?}", found.start.parameters[0]);
+        assert!(found.gain > 0.8, "{}", found.gain);
     }
 }

@@ -9,6 +9,9 @@
 //! which no model of a real bench undercuts. The torque that had to guide the motor counts as one more channel whose
 //! measured value is zero. A residual beyond three scales enters with its root only (soft L1), so that a few violent
 //! moments do not decide.
+//!
+//! Tendons of the nominal model may push, amplifiers read from zero: where a recording lies on that zero and never below,
+//! predictions are cut there as well.
 
 use std::sync::Arc;
 
@@ -42,6 +45,9 @@ const LEAD_IN_S: f64 = 0.3;
 
 /// Length of the stretches that are held out in turn, s.
 const STRETCH_S: f64 = 1.0;
+
+/// Samples on zero from which on an amplifier of tension is taken to have stood at its end.
+const SAMPLES_AT_ZERO: usize = 20;
 
 /// What the residual of one series measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -81,6 +87,8 @@ struct Dataset {
     blocks: Vec<Block>,
     /// Groups of consecutive blocks, as ranges into `blocks`.
     flutter: Vec<std::ops::Range<usize>>,
+    /// Tensions that stood at the lower end of their amplifier.
+    cut_at_zero: Vec<Channel>,
 }
 
 /// What one residual compares.
@@ -266,7 +274,16 @@ impl Objective {
     /// # Errors
     /// When the model cannot be driven.
     pub fn predict(&self, model: &JointModel) -> Result<Vec<Prediction>, Failure> {
-        self.datasets.iter().map(|dataset| replay(model, &dataset.input)).collect()
+        self.datasets
+            .iter()
+            .map(|dataset| {
+                let mut prediction = replay(model, &dataset.input)?;
+                for channel in &dataset.cut_at_zero {
+                    prediction.cut_below_zero(*channel);
+                }
+                Ok(prediction)
+            })
+            .collect()
     }
 
     /// Residuals of `model`.
@@ -436,8 +453,18 @@ impl Dataset {
             .iter()
             .map(|(_, values)| blocks.iter().map(|block| moments(&values[block.start..block.end])).collect())
             .collect();
-        Ok(Self { input, measured, moments, blocks, flutter })
+        let cut_at_zero = Channel::TENSIONS
+            .into_iter()
+            .filter(|channel| recording.channel(*channel).is_some_and(stood_at_zero))
+            .collect();
+        Ok(Self { input, measured, moments, blocks, flutter, cut_at_zero })
     }
+}
+
+/// Whether a sensor that reads from zero stood there: often exactly zero and never less.
+fn stood_at_zero(values: &[f64]) -> bool {
+    values.iter().all(|value| *value >= 0.0)
+        && values.iter().filter(|value| **value == 0.0).count() >= SAMPLES_AT_ZERO
 }
 
 /// Loss of a residual: `r²` up to the bend, growing with `|r|` beyond.
@@ -500,5 +527,44 @@ fn scale_of(model: &JointModel, series: Series, noise_variance: f64, datasets: &
             let spread = recorded(datasets, series).map(|v| moments(v).variance).fold(0.0, f64::max);
             (noise_variance + floor * floor * spread).sqrt().max(f64::MIN_POSITIVE)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+
+    /// A nominal tendon pushes where the real one hangs slack and its amplifier reads zero. Only where it does is the
+    /// prediction cut.
+    #[test]
+    fn a_tension_that_stood_at_zero_is_predicted_at_zero() {
+        let text =
+            include_str!("../../tests/rigs/bench.toml").replace("pretension_n = 30.0", "pretension_n = 2.0");
+        let rig = Rig::parse(&text, "bench.toml").unwrap();
+        let t_s: Vec<f64> = (0..2000).map(|k| f64::from(k) * 1e-3).collect();
+        let theta_rad: Vec<f64> = t_s.iter().map(|t| 0.4 * (4.0 * t).sin()).collect();
+        let mut recording = Recording::new("motion", t_s.clone()).with(Channel::ThetaIn, theta_rad);
+        for (channel, rest) in Channel::TENSIONS.into_iter().zip([0.0, 2.0, 0.0, -0.1]) {
+            let values = (0..t_s.len()).map(|k| if k % 2 == 0 { 0.0 } else { rest });
+            let touched = values
+                .enumerate()
+                .map(|(k, value)| if channel == Channel::F2 && k > 30 { 1.0 } else { value });
+            recording.set(channel, touched.collect());
+        }
+        recording.set(Channel::ThetaOut, vec![0.0; t_s.len()]);
+        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let predictions = objective.predict(&model).unwrap();
+        let lowest = |channel: Channel| {
+            predictions[0].channel(channel).unwrap().iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        let plain = replay(&model, &objective.datasets[0].input).unwrap();
+        for channel in Channel::TENSIONS {
+            assert!(plain.channel(channel).unwrap().iter().any(|tension| *tension < -1.0), "{channel:?}");
+        }
+        assert_eq!([Channel::F1, Channel::F3].map(lowest), [0.0, 0.0]);
+        // Hardly ever on zero, and below it.
+        assert!([Channel::F2, Channel::F4].map(lowest).iter().all(|tension| *tension < -1.0));
     }
 }
