@@ -125,13 +125,15 @@ pub fn select(
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut rounds = Vec::new();
     while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
-        let (record, mut fits) = search.one_more(&present)?;
-        rounds.push(Round { loss_before: present.loss, candidates: record });
+        let before = search.without_exhausted(&present)?;
+        let (record, mut fits) = search.one_more(&before)?;
+        rounds.push(Round { loss_before: before.loss, candidates: record });
         if fits.is_empty() {
             break;
         }
         let best = fits.remove(0);
-        if !worthwhile(present.loss, best.loss) {
+        // What does no better than the ordinary in its place is not found.
+        if !worthwhile(before.loss, best.loss) || best.loss >= present.loss {
             break;
         }
         let tried = |fitted: &Fitted| Tried {
@@ -140,10 +142,10 @@ pub fn select(
             heldout_loss: fitted.loss,
         };
         let Tried { effect, model, .. } = tried(&best);
-        let (loss_before, loss_after) = (present.loss, best.loss);
+        let (loss_before, loss_after) = (before.loss, best.loss);
         let others = fits.iter().map(tried).collect();
         chosen.push(Chosen { effect, model, loss_before, loss_after, others });
-        present = best;
+        present = search.with_ordinary(best)?;
     }
     if !progress.interrupted() {
         search.prune(&mut present, &mut chosen)?;
@@ -194,14 +196,26 @@ impl Search<'_> {
     /// The recalibrated model, and the same with what is ordinary, where there may be one.
     fn baseline(&self) -> Result<(Solution, Fitted), Failure> {
         self.progress.stage("recalibrating", 0);
-        let layout = Layout::of(self.believed);
-        let plain = self.fit(layout.clone(), self.believed, &[COARSE_STEP, FINE_STEP])?;
+        let plain = self.fit(Layout::of(self.believed), self.believed, &[COARSE_STEP, FINE_STEP])?;
         let baseline = plain.solution.clone();
-        let (with_ordinary, with) = layout.with_ordinary(&baseline.model);
-        if with_ordinary == layout {
-            return Ok((baseline, plain));
+        Ok((baseline, self.with_ordinary(plain)?))
+    }
+
+    /// `present`, fitted without the ordinary effects that are as large as they may be.
+    fn without_exhausted(&self, present: &Fitted) -> Result<Fitted, Failure> {
+        match present.layout.without_exhausted(self.believed, &present.solution.model) {
+            Some((layout, without)) => self.fit(layout, &without, &[COARSE_STEP, FINE_STEP]),
+            None => Ok(present.clone()),
         }
-        Ok((baseline, self.fit(with_ordinary, &with, &[COARSE_STEP, FINE_STEP])?))
+    }
+
+    /// `present` with what is ordinary beside what was found.
+    fn with_ordinary(&self, present: Fitted) -> Result<Fitted, Failure> {
+        let (layout, with) = present.layout.with_ordinary(&present.solution.model);
+        if layout == present.layout {
+            return Ok(present);
+        }
+        self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])
     }
 
     /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
@@ -269,7 +283,7 @@ impl Search<'_> {
     }
 
     fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
-        self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP])
+        self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])
     }
 
     /// Removes effects that the later ones have made superfluous.
@@ -282,6 +296,7 @@ impl Search<'_> {
         while index < chosen.len() && chosen.len() > 1 && !self.progress.interrupted() {
             let (layout, without) = present.layout.without(&present.solution.model, index);
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
+            let rest = self.without_exhausted(&rest)?;
             self.progress.advance(1);
             if worthwhile(rest.loss, present.loss) {
                 chosen[index].loss_before = rest.loss;
@@ -334,7 +349,9 @@ fn negligible(believed: &JointModel, effect: &ActiveEffect) -> bool {
     }
     match descriptor.id {
         // Friction that hardly falls with speed is dry friction, which has a name of its own.
-        "motor_stribeck_friction" => value < 0.3 * effect.parameters[2].max(strength.default),
+        "motor_stribeck_friction" => {
+            value < (0.3 * effect.parameters[2]).max(NAMED_STRENGTH * strength.default)
+        }
         // The typical offset depends on the channel; the loss alone decides.
         "sensor_offset" => false,
         _ => descriptor.neutral.is_some_and(|neutral| {
