@@ -354,10 +354,7 @@ fn traces(objective: &Objective, stages: &Stages) -> Vec<Trace> {
     for block in objective.blocks(0).iter().filter(|block| block.part == Part::HeldOut) {
         held_out[block.start..block.end].fill(true);
     }
-    let series_of = |prediction: &Prediction, series: Series| match series {
-        Series::Channel(channel) => prediction.channel(channel).map(<[f64]>::to_vec),
-        Series::Guide => Some(prediction.guide_nm.clone()),
-    };
+    let series_of = |prediction: &Prediction, series: Series| series.of(prediction).map(<[f64]>::to_vec);
     objective
         .scales()
         .iter()

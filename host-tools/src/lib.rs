@@ -19,3 +19,5 @@ pub mod report;
 pub mod rig;
 pub mod simulate;
 pub mod simulation;
+#[cfg(test)]
+mod test_bench;

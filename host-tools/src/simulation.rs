@@ -396,7 +396,7 @@ impl<'a> Sampler<'a> {
 }
 
 /// Values of one sensor, sample by sample.
-fn through(
+pub(crate) fn through(
     t_s: &[f64],
     values: &[f64],
     mut sensor: impl FnMut(&mut EffectStates, &mut SensorPort),
@@ -420,21 +420,13 @@ mod tests {
     use bowden_model::effects::CATALOGUE;
 
     use super::*;
-    use crate::recording::Recording;
-    use crate::rig::Rig;
+    use crate::test_bench;
 
     /// What screening takes for a simulation with one more sensor effect is that simulation, bit for bit.
     #[test]
     fn a_sensor_that_drives_nothing_is_seen_through_without_another_simulation() {
-        let rig = Rig::parse(include_str!("../tests/rigs/bench.toml"), "bench.toml").unwrap();
-        let t_s: Vec<f64> = (0..1500).map(|k| f64::from(k) * 1e-3).collect();
-        let theta_rad: Vec<f64> = t_s.iter().map(|t| 0.4 * (4.0 * t).sin()).collect();
-        let no = vec![0.0; t_s.len()];
-        let mut recording = Recording::new("motion", t_s).with(Channel::ThetaIn, theta_rad);
-        for channel in Channel::TENSIONS.into_iter().chain([Channel::ThetaOut]) {
-            recording.set(channel, no.clone());
-        }
-        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        let recording = test_bench::swung(1500);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let input = ReplayInput::new(&model, &recording).unwrap();
         let plain = replay(&model, &input).unwrap();
         let sensors = CATALOGUE.iter().filter(|effect| effect.descriptor().component == Component::Sensors);

@@ -85,6 +85,16 @@ class Answer:
     diverged_s: dict[str, float] = field(default_factory=dict)
     """Channels whose best settings diverged on the held-out inputs, and when; other settings took their place."""
 
+    def take(self, case: Case, output: int, errors: dict, free_run, terms: dict) -> None:
+        """Adds an output as the settings of the least error predict it that stay; `free_run` gives the held-out values of
+        settings and leaves the number of their terms in `terms`."""
+        name = case.outputs[output]
+        values, settings, diverged_s = first_that_stays(case, output, sorted(errors, key=errors.__getitem__), free_run)
+        self.prediction = np.column_stack([self.prediction, values])
+        self.chosen[name] = f"{settings}, {terms[settings]} terms"
+        if diverged_s is not None:
+            self.diverged_s[name] = diverged_s
+
 
 REGRESSORS = ["theta_in_rad", "speed_rad_s", "voltage_v", "sign_v"]
 """Input angle without its counts, its speed, the motor's voltage, and sign(v)."""

@@ -16,7 +16,7 @@ from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-from case_files import REGRESSORS, Answer, Case, advanced, confined, first_that_stays, relative_error, run, split
+from case_files import REGRESSORS, Answer, Case, advanced, confined, relative_error, run, split
 
 TERMS = 25
 """Most terms of a model; the information criterion takes fewer where they do."""
@@ -75,7 +75,7 @@ def predict(case: Case) -> Answer:
     x, y = inputs / x_scale, outputs / y_scale
     fit, validate = split(len(x))
     answer = Answer(np.empty((len(case.heldout), 0)), {})
-    for output, name in enumerate(case.outputs):
+    for output in range(len(case.outputs)):
         own = y[:, [output]]
         errors = {}
         for settings in CANDIDATES:
@@ -90,12 +90,7 @@ def predict(case: Case) -> Answer:
             first = np.full((settings.lags, 1), start[output] / y_scale[output])
             return free_run(model, heldout / x_scale, first)[:, 0] * y_scale[output]
 
-        ranked = sorted(CANDIDATES, key=errors.__getitem__)
-        values, settings, diverged_s = first_that_stays(case, output, ranked, run_on_heldout)
-        answer.prediction = np.column_stack([answer.prediction, values])
-        answer.chosen[name] = f"{settings}, {terms[settings]} terms"
-        if diverged_s is not None:
-            answer.diverged_s[name] = diverged_s
+        answer.take(case, output, errors, run_on_heldout, terms)
     return answer
 
 

@@ -23,7 +23,6 @@ from case_files import (
     advanced,
     bounds,
     confined,
-    first_that_stays,
     folds,
     relative_error,
     run,
@@ -137,7 +136,7 @@ def predict(case: Case) -> Answer:
     reach = float(np.abs(scale.of(np.vstack(bounds(recorded)))).max())
     x, start = scale.of(recorded), scale.of(case.initial_state())
     answer = Answer(np.empty((len(case.heldout), 0)), {})
-    for output, name in enumerate(case.outputs):
+    for output in range(len(case.outputs)):
         own = x[:, [output]]
         errors = {}
         for settings in CANDIDATES:
@@ -158,12 +157,7 @@ def predict(case: Case) -> Answer:
             states = free_run(model, start[[output]], inputs.of(settings.inputs(case.heldout)), dt, reach)
             return states[:, 0] * scale.spread[output] + scale.mean[output]
 
-        ranked = sorted(CANDIDATES, key=errors.__getitem__)
-        values, settings, diverged_s = first_that_stays(case, output, ranked, run_on_heldout)
-        answer.prediction = np.column_stack([answer.prediction, values])
-        answer.chosen[name] = f"{settings}, {terms[settings]} terms"
-        if diverged_s is not None:
-            answer.diverged_s[name] = diverged_s
+        answer.take(case, output, errors, run_on_heldout, terms)
     return answer
 
 

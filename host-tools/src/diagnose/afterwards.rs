@@ -30,10 +30,10 @@ mod tests {
 
     use super::*;
     use crate::recording::Recording;
-    use crate::rig::Rig;
+    use crate::test_bench;
 
     fn after(clock_s: f64, effects: &[ActiveEffect]) -> JointModel {
-        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
+        let rig = test_bench::rig();
         let recording = Recording::new("any", vec![0.0, 1.0])
             .with(bowden_model::channel::Channel::ThetaIn, vec![0.0, 0.0]);
         let model = JointModel::from_rig(&rig, &recording).unwrap();

@@ -220,6 +220,7 @@ mod tests {
     use bowden_model::effects::find;
 
     use super::*;
+    use crate::test_bench;
 
     #[test]
     fn every_course_keeps_its_range_and_does_not_jump() {
@@ -255,7 +256,7 @@ mod tests {
     }
 
     fn parts(named: &str, rival: ActiveEffect, shown: &Shown) -> Option<Experiment> {
-        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
+        let rig = test_bench::rig();
         let t_s: Vec<f64> = (0..100).map(|k| f64::from(k) * 1e-3).collect();
         let every =
             [Channel::ThetaIn, Channel::ThetaOut, Channel::Duty, Channel::BusVoltage, Channel::MotorCurrent];

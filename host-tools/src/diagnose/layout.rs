@@ -178,13 +178,13 @@ mod tests {
 
     use super::*;
     use crate::recording::Recording;
-    use crate::rig::Rig;
+    use crate::test_bench;
 
     /// Stall torque of the bench of these tests, N·m: 0.03 · 30 · 24 / 2.
     const STALL_NM: f64 = 10.8;
 
     fn bench() -> JointModel {
-        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
+        let rig = test_bench::rig();
         let every = [Channel::ThetaIn, Channel::ThetaOut, Channel::Duty, Channel::F1];
         let recording =
             every.into_iter().fold(Recording::new("any", vec![0.0, 1.0]), |recording, channel| {

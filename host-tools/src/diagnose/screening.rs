@@ -191,28 +191,20 @@ impl Basis {
 
 #[cfg(test)]
 mod tests {
-    use bowden_model::channel::Channel;
     use bowden_model::effects::find;
 
     use super::*;
     use crate::fit::solver::solve_in_rounds;
     use crate::joint_model::JointModel;
     use crate::progress::Quiet;
-    use crate::recording::Recording;
-    use crate::rig::Rig;
     use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
 
     /// What an effect of either sign is tried at says where it really is, on the other side and beyond what is trusted.
     #[test]
     fn a_strong_effect_is_promised_on_the_other_side_of_its_start() {
-        let rig = Rig::parse(include_str!("../../tests/rigs/bench.toml"), "bench.toml").unwrap();
-        let t_s: Vec<f64> = (0..6000).map(|k| f64::from(k) * 1e-3).collect();
-        let theta_rad: Vec<f64> = t_s.iter().map(|t| 0.4 * (4.0 * t).sin()).collect();
-        let mut recording = Recording::new("motion", t_s.clone()).with(Channel::ThetaIn, theta_rad);
-        for channel in Channel::TENSIONS.into_iter().chain([Channel::ThetaOut]) {
-            recording.set(channel, vec![0.0; t_s.len()]);
-        }
-        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let start = ActiveEffect::with_defaults(find("asymmetric_friction").unwrap());
         let strong = -1.1 * STRONGEST * start.parameters[0];
         let mut real = model.clone();

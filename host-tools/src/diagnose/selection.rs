@@ -212,7 +212,7 @@ impl Search<'_> {
     /// `present` with what is ordinary beside what was found.
     fn with_ordinary(&self, present: Fitted) -> Result<Fitted, Failure> {
         let (layout, with) = present.layout.with_ordinary(&present.solution.model);
-        if layout == present.layout {
+        if layout == present.layout || self.progress.interrupted() {
             return Ok(present);
         }
         self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])
@@ -296,10 +296,10 @@ impl Search<'_> {
         while index < chosen.len() && chosen.len() > 1 && !self.progress.interrupted() {
             let (layout, without) = present.layout.without(&present.solution.model, index);
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
-            let rest = self.without_exhausted(&rest)?;
+            let bare_loss = self.without_exhausted(&rest)?.loss;
             self.progress.advance(1);
-            if worthwhile(rest.loss, present.loss) {
-                chosen[index].loss_before = rest.loss;
+            if worthwhile(bare_loss, present.loss) {
+                chosen[index].loss_before = bare_loss;
                 chosen[index].loss_after = present.loss;
                 index += 1;
             } else {

@@ -67,6 +67,15 @@ impl Series {
             Self::Guide => "motor_torque_nm",
         }
     }
+
+    /// What a simulation says of it.
+    #[must_use]
+    pub fn of(self, prediction: &Prediction) -> Option<&[f64]> {
+        match self {
+            Self::Channel(channel) => prediction.channel(channel),
+            Self::Guide => Some(&prediction.guide_nm),
+        }
+    }
 }
 
 /// Which part of the data a sum covers.
@@ -274,16 +283,7 @@ impl Objective {
     /// # Errors
     /// When the model cannot be driven.
     pub fn predict(&self, model: &JointModel) -> Result<Vec<Prediction>, Failure> {
-        self.datasets
-            .iter()
-            .map(|dataset| {
-                let mut prediction = replay(model, &dataset.input)?;
-                for channel in &dataset.cut_at_zero {
-                    prediction.cut_below_zero(*channel);
-                }
-                Ok(prediction)
-            })
-            .collect()
+        self.datasets.iter().map(|dataset| Ok(dataset.cut(replay(model, &dataset.input)?))).collect()
     }
 
     /// Residuals of `model`.
@@ -307,7 +307,7 @@ impl Objective {
             .datasets
             .iter()
             .zip(predictions)
-            .map(|(dataset, prediction)| prediction.seen_through(effect, &dataset.input))
+            .map(|(dataset, prediction)| Ok(dataset.cut(prediction.seen_through(effect, &dataset.input)?)))
             .collect();
         Ok(self.compare(&seen?))
     }
@@ -319,10 +319,7 @@ impl Objective {
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
             for ((series, measured), moments_of) in dataset.measured.iter().zip(&dataset.moments) {
                 let scale = self.scale(*series);
-                let predicted = match series {
-                    Series::Channel(channel) => prediction.channel(*channel).unwrap_or(&[]),
-                    Series::Guide => &prediction.guide_nm,
-                };
+                let predicted = series.of(prediction).unwrap_or(&[]);
                 let offset = self.offset(*series, dataset, measured, predicted);
                 let noise_variance = self.noise_variance(*series);
                 let mut scatter = Vec::with_capacity(dataset.blocks.len());
@@ -392,10 +389,7 @@ impl Objective {
         let (mut sum, mut count) = (0.0, 0.0);
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
             let Some((_, measured)) = dataset.measured.iter().find(|(s, _)| *s == series) else { continue };
-            let predicted = match series {
-                Series::Channel(channel) => prediction.channel(channel).unwrap_or(&[]),
-                Series::Guide => &prediction.guide_nm,
-            };
+            let predicted = series.of(prediction).unwrap_or(&[]);
             let offset = self.offset(series, dataset, measured, predicted);
             for block in dataset.blocks.iter().filter(|block| block.part == part) {
                 for k in block.start..block.end {
@@ -409,6 +403,14 @@ impl Objective {
 }
 
 impl Dataset {
+    /// What the amplifiers of this recording would have shown.
+    fn cut(&self, mut prediction: Prediction) -> Prediction {
+        for channel in &self.cut_at_zero {
+            prediction.cut_below_zero(*channel);
+        }
+        prediction
+    }
+
     fn new(model: &JointModel, recording: &Recording, part: Part, split: bool) -> Result<Self, Failure> {
         let mut input = ReplayInput::new(model, recording)?;
         if input.motion().is_none()
@@ -532,28 +534,26 @@ fn scale_of(model: &JointModel, series: Series, noise_variance: f64, datasets: &
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::effect::Target;
+    use bowden_model::effects::find;
+
     use super::*;
-    use crate::rig::Rig;
+    use crate::test_bench;
 
     /// A nominal tendon pushes where the real one hangs slack and its amplifier reads zero. Only where it does is the
     /// prediction cut.
     #[test]
     fn a_tension_that_stood_at_zero_is_predicted_at_zero() {
-        let text =
-            include_str!("../../tests/rigs/bench.toml").replace("pretension_n = 30.0", "pretension_n = 2.0");
-        let rig = Rig::parse(&text, "bench.toml").unwrap();
-        let t_s: Vec<f64> = (0..2000).map(|k| f64::from(k) * 1e-3).collect();
-        let theta_rad: Vec<f64> = t_s.iter().map(|t| 0.4 * (4.0 * t).sin()).collect();
-        let mut recording = Recording::new("motion", t_s.clone()).with(Channel::ThetaIn, theta_rad);
+        let mut recording = test_bench::swung(2000);
         for (channel, rest) in Channel::TENSIONS.into_iter().zip([0.0, 2.0, 0.0, -0.1]) {
-            let values = (0..t_s.len()).map(|k| if k % 2 == 0 { 0.0 } else { rest });
+            let values = (0..2000).map(|k| if k % 2 == 0 { 0.0 } else { rest });
             let touched = values
                 .enumerate()
                 .map(|(k, value)| if channel == Channel::F2 && k > 30 { 1.0 } else { value });
             recording.set(channel, touched.collect());
         }
-        recording.set(Channel::ThetaOut, vec![0.0; t_s.len()]);
-        let model = JointModel::from_rig(&rig, &recording).unwrap();
+        let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        model.parameters.tendon.as_mut().unwrap().pretension_n = 2.0;
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let predictions = objective.predict(&model).unwrap();
         let lowest = |channel: Channel| {
@@ -566,5 +566,11 @@ mod tests {
         assert_eq!([Channel::F1, Channel::F3].map(lowest), [0.0, 0.0]);
         // Hardly ever on zero, and below it.
         assert!([Channel::F2, Channel::F4].map(lowest).iter().all(|tension| *tension < -1.0));
+        // A sensor that is found to read too little ends at the same zero.
+        let mut offset = ActiveEffect::with_defaults(find("sensor_offset").unwrap()).with("offset", -1.0);
+        offset.target = Target::One(Channel::F1);
+        let seen = objective.residuals_seen_through(&predictions, offset).unwrap();
+        model.effects.push(offset);
+        assert_eq!(seen.values, objective.residuals(&model).unwrap().values);
     }
 }

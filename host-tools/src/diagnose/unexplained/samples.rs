@@ -159,10 +159,7 @@ impl Samples {
                 ];
                 self.variables.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
                 for left in &mut self.left {
-                    let simulated = match left.series {
-                        Series::Channel(channel) => prediction.channel(channel),
-                        Series::Guide => Some(prediction.guide_nm.as_slice()),
-                    };
+                    let simulated = left.series.of(prediction);
                     let difference = objective
                         .measured(recording, left.series)
                         .zip(simulated.filter(|values| values.len() == t_s.len()))
