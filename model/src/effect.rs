@@ -182,6 +182,8 @@ pub struct MotorPort {
     pub coulomb_nm: f64,
     /// Play between rotor and input pulley, rad at the pulley.
     pub gear_play_rad: f64,
+    /// Share of the viscous friction that acts behind that play, on the pulley, 0 to 1.
+    pub drag_behind_play: f64,
 }
 
 /// Friction between tendon and sheath as it acts in one tendon for slip that starts at one end.

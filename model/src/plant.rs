@@ -421,20 +421,20 @@ impl Plant {
                 } else {
                     -self.torque_in_nm(config) - self.rope_loss_nm(config) * Self::pulley_ratio(config)
                 };
-                let play_rad = self.turn_rotor(config, motor, load_nm, input.input_torque_nm, dt_s);
+                let port = self.turn_rotor(config, motor, load_nm, input.input_torque_nm, dt_s);
                 let delta_rad = dt_s * self.omega_motor_rad_s;
                 self.theta_motor_rad += delta_rad;
                 self.turn_input(config, delta_rad);
-                if play_rad > 0.0 || self.gear_offset_rad != 0.0 {
-                    self.gear_offset_rad = self.relax_play(
-                        config,
-                        End::Input,
-                        input.loose_pulley,
-                        self.gear_offset_rad,
-                        play_rad,
-                    );
+                if port.gear_play_rad > 0.0 || self.gear_offset_rad != 0.0 {
+                    let drag = motor.viscous_nm_s_per_rad * port.drag_behind_play / dt_s;
+                    let loose = Outside {
+                        torque_nm: input.loose_pulley.torque_nm - drag * delta_rad,
+                        stiffness_nm_per_rad: input.loose_pulley.stiffness_nm_per_rad + drag,
+                    };
+                    self.gear_offset_rad =
+                        self.relax_play(config, End::Input, loose, self.gear_offset_rad, port.gear_play_rad);
                 }
-                self.inside_gear_play = self.gear_offset_rad.abs() < 0.5 * play_rad;
+                self.inside_gear_play = self.gear_offset_rad.abs() < 0.5 * port.gear_play_rad;
                 let before = self.theta_in_rad;
                 self.theta_in_rad = self.theta_motor_rad - self.gear_offset_rad;
                 self.omega_in_rad_s = (self.theta_in_rad - before) / dt_s;
@@ -465,7 +465,7 @@ impl Plant {
     fn follow_with_rotor(&mut self, config: &PlantConfig, motor: Option<&MotorParameters>, dt_s: f64) {
         let rigid = match motor {
             Some(motor) if config.effects.touches(Component::Motor) => {
-                let play_rad = self.turn_rotor(config, motor, 0.0, 0.0, dt_s);
+                let play_rad = self.turn_rotor(config, motor, 0.0, 0.0, dt_s).gear_play_rad;
                 let lead_rad = self.theta_motor_rad + dt_s * self.omega_motor_rad_s - self.theta_in_rad;
                 self.theta_motor_rad = self.theta_in_rad + lead_rad.clamp(-0.5 * play_rad, 0.5 * play_rad);
                 lead_rad.abs() >= 0.5 * play_rad
@@ -475,12 +475,13 @@ impl Plant {
                 true
             }
         };
+        self.inside_gear_play = !rigid;
         if rigid {
             self.omega_motor_rad_s = self.omega_in_rad_s;
         }
     }
 
-    /// Speed of the rotor after the step; returns the play of the gear.
+    /// Speed of the rotor after the step; returns what effects say of the motor.
     fn turn_rotor(
         &mut self,
         config: &PlantConfig,
@@ -488,15 +489,16 @@ impl Plant {
         load_nm: f64,
         outside_nm: f64,
         dt_s: f64,
-    ) -> f64 {
+    ) -> MotorPort {
         let motor_nm = pulley_torque_constant_nm_per_a(motor) * self.current_a;
         let port = self.motor_port(config, motor_nm, load_nm, load_nm.abs(), dt_s);
         let inertia = pulley_inertia_kg_m2(motor);
         let torque_nm = motor_nm + load_nm + outside_nm + port.torque_nm;
         let driven = self.omega_motor_rad_s + dt_s * torque_nm / inertia;
         let dry = after_dry_friction_rad_s(driven, port.coulomb_nm, inertia, dt_s);
-        self.omega_motor_rad_s = dry / (1.0 + dt_s * motor.viscous_nm_s_per_rad / inertia);
-        port.gear_play_rad
+        let dragged = if self.inside_gear_play { 1.0 - port.drag_behind_play } else { 1.0 };
+        self.omega_motor_rad_s = dry / (1.0 + dt_s * dragged * motor.viscous_nm_s_per_rad / inertia);
+        port
     }
 
     fn motor_port(
@@ -518,6 +520,7 @@ impl Plant {
             torque_nm: 0.0,
             coulomb_nm: 0.0,
             gear_play_rad: 0.0,
+            drag_behind_play: 0.0,
         };
         if config.effects.touches(Component::Motor) {
             config.effects.motor(&mut self.states, &mut port);

@@ -112,6 +112,10 @@ fn starts(
         "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
         "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
         "end_stop_contact" => end_stop_starts(base, model, objective),
+        // A simulation with a fifth more or less play than there is predicts no better than one without.
+        "gear_backlash" => (-6..=6)
+            .map(|third| with_strength(base, base.parameters[0] * (f64::from(third) / 3.0).exp2()))
+            .collect(),
         // The other two quarters are these with the other sign.
         "encoder_eccentricity" => (0..2)
             .map(|quarter| base.with("phase_rad", f64::from(quarter) * TAU / 4.0 - TAU / 2.0 + 0.01))

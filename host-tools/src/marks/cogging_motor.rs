@@ -241,6 +241,7 @@ fn terms(physics: Physics, harmonics: &[u32], motion: (&[f64], &[f64], &[f64]), 
                     torque_nm: 0.0,
                     coulomb_nm: 0.0,
                     gear_play_rad: 0.0,
+                    drag_behind_play: 0.0,
                 };
                 active.effect.motor(&active.parameters, &mut state, &mut port);
                 let turned_rad = if k == 0 { 0.0 } else { theta_rad[k] - theta_rad[k - 1] };

@@ -9,13 +9,16 @@ static DESCRIPTOR: Descriptor = Descriptor {
     id: "gear_backlash",
     component: Component::Motor,
     summary: "play in the gear between rotor and input pulley",
-    parameters: &[ParameterSpec::linear(
-        "gap_rad",
-        "rad",
-        [0.0, 0.5],
-        0.02,
-        "whole play, at the input pulley",
-    )],
+    parameters: &[
+        ParameterSpec::linear("gap_rad", "rad", [0.0, 0.5], 0.02, "whole play, at the input pulley"),
+        ParameterSpec::linear(
+            "drag_behind",
+            "1",
+            [0.0, 1.0],
+            0.5,
+            "share of the motor's viscous friction that acts on the pulley's side",
+        ),
+    ],
     neutral: Some(0.0),
     channels: &[],
 };
@@ -27,5 +30,6 @@ impl Effect for GearBacklash {
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         port.gear_play_rad += p[0];
+        port.drag_behind_play = p[1];
     }
 }

@@ -6,7 +6,7 @@ use crate::near::near;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
-use bowden_model::parameters::JointParameters;
+use bowden_model::parameters::{JointParameters, MotorParameters};
 use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, StepInput};
 
 fn effect(id: &str) -> ActiveEffect {
@@ -150,6 +150,35 @@ fn inside_a_play_the_pulley_gives_way_and_not_the_rotor() {
         near("rotor", run.plant.theta_motor_rad(), 0.0, 1e-9);
         let turned_rad = run.plant.theta_in_rad();
         assert!(turned_rad * outside_nm > 0.0 && turned_rad.abs() < 0.01, "turned by {turned_rad} rad");
+    }
+}
+
+/// What drags behind the play slows the pulley and not the rotor. A rotor alone reaches the speed that its own share leaves
+/// it; a pulley pulled by the torque T against the cables' k goes T/k (1 - 1/(1 + k Δt/b)ⁿ) in n implicit steps.
+#[test]
+fn inside_a_play_rotor_and_pulley_are_dragged_by_their_shares() {
+    const STEP_S: f64 = 5e-4;
+    const STIFFNESS_NM_PER_RAD: f64 = 2.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M;
+    const TORQUE_NM: f64 = 0.05;
+    let mut parameters = joint(0.0);
+    parameters.motor = Some(MotorParameters { viscous_nm_s_per_rad: 0.2, ..MOTOR });
+    let boundaries = (InputBoundary::Motor, OutputBoundary::Angle);
+    for behind in [0.0, 0.25, 1.0] {
+        let play = effect("gear_backlash").with("gap_rad", 0.4).with("drag_behind", behind);
+        let mut run = Run::new(parameters, &[play], boundaries, STEP_S);
+        run.until(0.3, |_| duty(0.02));
+        let before_rad = run.plant.theta_motor_rad();
+        run.until(0.3 + STEP_S, |_| duty(0.02));
+        assert!(run.plant.inside_gear_play());
+        let speed_rad_s = (run.plant.theta_motor_rad() - before_rad) / STEP_S;
+        near("rotor", speed_rad_s, steady_speed(0.02, 0.2 * (1.0 - behind), 0.0), 1e-4);
+
+        let mut run = Run::new(parameters, &[play], boundaries, STEP_S);
+        let loose_pulley = Outside { torque_nm: TORQUE_NM, stiffness_nm_per_rad: 0.0 };
+        run.until(10.0 * STEP_S, |_| StepInput { loose_pulley, ..duty(0.0) });
+        let lag = 0.2 * behind / (0.2 * behind + STIFFNESS_NM_PER_RAD * STEP_S);
+        let turned_rad = TORQUE_NM / STIFFNESS_NM_PER_RAD * (1.0 - lag.powi(10));
+        near("pulley", run.plant.theta_in_rad(), turned_rad, 1e-6);
     }
 }
 
