@@ -565,6 +565,28 @@ fn sensor_saturation_caps_one_channel() {
     assert_eq!(with.f1_n, base.f1_n);
 }
 
+/// A drawn limit lies within what the channel shows in the motion of the laboratory: one that it never reaches hides nothing.
+#[test]
+fn a_drawn_saturation_acts() {
+    let base = bench();
+    let motion = Motion::new(MotionKind::Lab, 40.0, 7);
+    let truth = record(&base, &[], &motion, 1).expect("a valid bench");
+    let mut drawn_for = [false; 4];
+    for seed in 0..12 {
+        for strength in [0.5, 1.0] {
+            let effect = ConcealedEffect::drawn("sensor_saturation", strength, seed).expect("a known id");
+            let ConcealedEffect::SensorSaturation(law) = effect else { panic!("another effect") };
+            let tensions = [&truth.f1_n, &truth.f2_n, &truth.f3_n, &truth.f4_n];
+            let named = [Channel::F1, Channel::F2, Channel::F3, Channel::F4];
+            let column = named.iter().position(|c| *c == law.channel).expect("a tension");
+            let above = tensions[column].iter().filter(|tension| **tension > law.limit_n).count();
+            assert!(above >= 200, "{} N on {:?}: {above} samples above", law.limit_n, law.channel);
+            drawn_for[column] = true;
+        }
+    }
+    assert_eq!(drawn_for, [true; 4]);
+}
+
 #[test]
 fn physics_outside_the_catalogue_is_marked_and_leaves_its_own_trace() {
     let outside: Vec<&str> = ConcealedEffect::IDS

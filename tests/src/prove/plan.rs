@@ -13,9 +13,9 @@ const PERTURBED_PERCENT: f64 = 3.0;
 /// Noise of a noisy rig's tension and current channels over that of a quiet one; its rig file says so.
 pub const NOISY: f64 = 3.0;
 
-/// Strength of the weaker of the two cases of an effect, where a half would not show at all: what limits a channel or a
-/// tendon must lie within the range of the motion.
-const WEAK_STRENGTHS: [(&str, f64); 2] = [("sensor_saturation", 0.9), ("tendon_slack", 0.8)];
+/// Strength of the weaker of the two cases of an effect, where a half would not show at all: a tendon hangs slack only
+/// below the tensions of the motion.
+const WEAK_STRENGTHS: [(&str, f64); 1] = [("tendon_slack", 0.8)];
 
 /// Strength of the weaker case of every other effect; 1 is a clear fault.
 const WEAK_STRENGTH: f64 = 0.5;
