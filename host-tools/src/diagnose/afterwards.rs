@@ -1,5 +1,5 @@
-//! The bench after its recordings: what happened at a moment has happened, what has passed is gone, and a drift goes on
-//! from where it is.
+//! The bench after its recordings: what happened at a moment has happened, what has passed is gone, and creep and drift go
+//! on from where they are.
 
 use crate::joint_model::JointModel;
 
@@ -17,6 +17,7 @@ pub(super) fn afterwards(model: &JointModel, own: usize, clock_s: f64) -> JointM
                 }
                 now.effects.push(effect.with("rate_per_s", effect.parameters[0] / drifted.max(1e-3)));
             }
+            "tendon_creep" => now.effects.push(effect.with("age_s", effect.parameters[2] + clock_s)),
             _ => now.effects.push(effect.with("time_s", 0.0)),
         }
     }
@@ -52,6 +53,13 @@ mod tests {
         assert!((friction - 0.096).abs() < 1e-12, "{friction}");
         let rate = now.effects[0].parameters[0];
         assert!((rate * friction - -0.01 * 0.12).abs() < 1e-12, "{rate}");
+    }
+
+    #[test]
+    fn what_has_crept_does_not_begin_anew() {
+        let creep = effect("tendon_creep").with("ratio", 0.3);
+        assert_eq!(after(20.0, &[creep]).effects, [creep.with("age_s", 20.0)]);
+        assert_eq!(after(20.0, &[creep.with("age_s", 5.0)]).effects, [creep.with("age_s", 25.0)]);
     }
 
     #[test]

@@ -144,6 +144,11 @@ fn stretch_tells_the_effect() {
     near("creep after τ", run.tensions_n()[0], PRETENSION_N * (1.0 - 0.15 / 1.15 * done), 2e-3);
     draw(&mut run, 0.0, 120.0);
     near("creep in the end", run.tensions_n()[0], PRETENSION_N / 1.15, 1e-5);
+    let mut run = held(0.0, &[effect("tendon_creep").with("age_s", 8.0)]);
+    draw(&mut run, 0.0, 1e-3);
+    near("crept before", run.tensions_n()[0], PRETENSION_N * (1.0 - 0.15 / 1.15 * done), 2e-3);
+    draw(&mut run, 0.0, 120.0);
+    near("and on", run.tensions_n()[0], PRETENSION_N / 1.15, 1e-5);
 
     // A fifth of the pretension after 10 s.
     let mut run = held(0.0, &[effect("pretension_loss")]);
