@@ -152,6 +152,7 @@ fn gear_friction_grows_with_the_given_power_of_the_torque_carried() {
             carried_torque_nm: 0.5,
             torque_nm: 0.0,
             coulomb_nm: 0.1,
+            presliding_rad: bowden_model::effect::PRESLIDING_RAD,
             gear_play_rad: 0.0,
             drag_behind_play: 0.0,
         };

@@ -64,6 +64,23 @@ pub fn current_after_a(
         / (1.0 + per_henry * port.resistance_ohm)
 }
 
+/// Speed after dry friction acted for `dt_s` on `inertia_kg_m2`, which builds up to `level_nm` over a turn of `travel_rad` > 0
+/// (Prandtl's element, solved with the speed at the end of the step). `presliding` is the part of the level that acts, -1 to 1.
+#[must_use]
+pub fn after_elastic_friction_rad_s(
+    presliding: &mut f64,
+    omega_rad_s: f64,
+    [level_nm, travel_rad]: [f64; 2],
+    inertia_kg_m2: f64,
+    dt_s: f64,
+) -> f64 {
+    let loss = level_nm * dt_s / inertia_kg_m2;
+    let per_speed = dt_s / travel_rad;
+    let sticking_rad_s = (omega_rad_s - loss * *presliding) / (1.0 + loss * per_speed);
+    *presliding = (*presliding + per_speed * sticking_rad_s).clamp(-1.0, 1.0);
+    omega_rad_s - loss * *presliding
+}
+
 /// Speed after dry friction of `level_nm` acted for `dt_s` on `inertia_kg_m2`: opposes motion, never reverses it.
 #[must_use]
 pub fn after_dry_friction_rad_s(omega_rad_s: f64, level_nm: f64, inertia_kg_m2: f64, dt_s: f64) -> f64 {

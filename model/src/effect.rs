@@ -158,6 +158,10 @@ pub struct DrivePort {
     pub resistance_ohm: f64,
 }
 
+/// Turn at the input pulley over which the dry friction of a motor and its gear usually builds up after a reversal, rad:
+/// balls, seals and teeth give way elastically by some ten thousandths of a turn.
+pub const PRESLIDING_RAD: f64 = 5e-4;
+
 /// Mechanical side of the motor, seen at the input pulley.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorPort {
@@ -180,6 +184,8 @@ pub struct MotorPort {
     pub torque_nm: f64,
     /// Level of dry friction, N·m ≥ 0; it opposes motion and never reverses it.
     pub coulomb_nm: f64,
+    /// Turn over which dry friction builds up after a reversal, rad > 0.
+    pub presliding_rad: f64,
     /// Play between rotor and input pulley, rad at the pulley.
     pub gear_play_rad: f64,
     /// Share of the viscous friction that acts behind that play, on the pulley, 0 to 1.

@@ -11,10 +11,10 @@ use libm::{sin, sqrt};
 
 use crate::channel::Channel;
 use crate::drive::{
-    BridgeInput, after_dry_friction_rad_s, current_after_a, pulley_inertia_kg_m2,
-    pulley_torque_constant_nm_per_a,
+    BridgeInput, after_dry_friction_rad_s, after_elastic_friction_rad_s, current_after_a,
+    pulley_inertia_kg_m2, pulley_torque_constant_nm_per_a,
 };
-use crate::effect::{Component, JointPort, MotorPort};
+use crate::effect::{Component, JointPort, MotorPort, PRESLIDING_RAD};
 use crate::effect_set::{EffectSet, EffectStates, FRESH_STATES};
 use crate::parameters::{JointParameters, LoadParameters, MotorParameters};
 use crate::sheath::{End, SheathError};
@@ -26,10 +26,6 @@ pub const GRAVITY_M_S2: f64 = 9.80665;
 /// Part of the closing speed that arm and output pulley lose when a play of the joint closes. Steel on steel keeps about
 /// half; without any loss the arm would bounce for seconds, which no bench does.
 const IMPACT_LOSS: f64 = 0.5;
-
-/// Turn over which the dry friction of a spindle builds up after a reversal, rad: balls and seals give way elastically by
-/// some thousandths of a turn. A prescribed angle leaves the friction of a spindle at rest undetermined without it.
-const SPINDLE_PRESLIDING_RAD: f64 = 3e-3;
 
 /// Internal friction of the ropes: the torque of a stretch rate, as a time. A wire rope loses some 5 % of its elastic
 /// energy per cycle near 20 Hz, which gives half a millisecond; without it the arm would ring for seconds after each
@@ -259,7 +255,7 @@ pub struct Plant {
     gear_offset_rad: f64,
     inside_gear_play: bool,
     joint_offset_rad: f64,
-    spindle_presliding: f64,
+    motor_presliding: f64,
     spindle_friction_nm: f64,
     transmission: Option<Transmission>,
     states: EffectStates,
@@ -281,7 +277,7 @@ impl Plant {
             gear_offset_rad: 0.0,
             inside_gear_play: false,
             joint_offset_rad: 0.0,
-            spindle_presliding: 0.0,
+            motor_presliding: 0.0,
             spindle_friction_nm: 0.0,
             transmission: config.transmission.as_ref().map(Transmission::at_rest),
             states: FRESH_STATES,
@@ -456,9 +452,8 @@ impl Plant {
     fn rub_spindle(&mut self, config: &PlantConfig, delta_rad: f64, dt_s: f64) {
         let load_nm = -self.torque_in_nm(config);
         let port = self.motor_port(config, 0.0, load_nm, load_nm.abs(), dt_s);
-        self.spindle_presliding =
-            (self.spindle_presliding + delta_rad / SPINDLE_PRESLIDING_RAD).clamp(-1.0, 1.0);
-        self.spindle_friction_nm = port.coulomb_nm * self.spindle_presliding - port.torque_nm;
+        self.motor_presliding = (self.motor_presliding + delta_rad / port.presliding_rad).clamp(-1.0, 1.0);
+        self.spindle_friction_nm = port.coulomb_nm * self.motor_presliding - port.torque_nm;
     }
 
     /// Rotor behind a pulley that moves as prescribed: rigid without play, free inside a play.
@@ -492,12 +487,15 @@ impl Plant {
     ) -> MotorPort {
         let motor_nm = pulley_torque_constant_nm_per_a(motor) * self.current_a;
         let port = self.motor_port(config, motor_nm, load_nm, load_nm.abs(), dt_s);
+        let dragged = if self.inside_gear_play { 1.0 - port.drag_behind_play } else { 1.0 };
         let inertia = pulley_inertia_kg_m2(motor);
         let torque_nm = motor_nm + load_nm + outside_nm + port.torque_nm;
-        let driven = self.omega_motor_rad_s + dt_s * torque_nm / inertia;
-        let dry = after_dry_friction_rad_s(driven, port.coulomb_nm, inertia, dt_s);
-        let dragged = if self.inside_gear_play { 1.0 - port.drag_behind_play } else { 1.0 };
-        self.omega_motor_rad_s = dry / (1.0 + dt_s * dragged * motor.viscous_nm_s_per_rad / inertia);
+        // Viscous friction at the end of the step counts like inertia.
+        let slowed = inertia + dt_s * dragged * motor.viscous_nm_s_per_rad;
+        let driven = (inertia * self.omega_motor_rad_s + dt_s * torque_nm) / slowed;
+        let friction = [port.coulomb_nm, port.presliding_rad];
+        self.omega_motor_rad_s =
+            after_elastic_friction_rad_s(&mut self.motor_presliding, driven, friction, slowed, dt_s);
         port
     }
 
@@ -519,6 +517,7 @@ impl Plant {
             carried_torque_nm,
             torque_nm: 0.0,
             coulomb_nm: 0.0,
+            presliding_rad: PRESLIDING_RAD,
             gear_play_rad: 0.0,
             drag_behind_play: 0.0,
         };
@@ -669,9 +668,12 @@ impl Plant {
         let port = self.motor_port(config, motor_nm, load_nm, carried_nm, dt_s);
         let inertia = pulley_inertia_kg_m2(motor) + inertia_kg_m2(&load, joint.mass_kg);
         let viscous = motor.viscous_nm_s_per_rad + load.viscous_nm_s_per_rad;
-        let driven = self.omega_motor_rad_s + dt_s * (motor_nm + load_nm + port.torque_nm) / inertia;
-        let dry = after_dry_friction_rad_s(driven, port.coulomb_nm + joint.coulomb_nm, inertia, dt_s);
-        self.set_speed_rad_s(dry / (1.0 + dt_s * viscous / inertia));
+        let slowed = inertia + dt_s * viscous;
+        let torque_nm = motor_nm + load_nm + port.torque_nm;
+        let driven = (inertia * self.omega_motor_rad_s + dt_s * torque_nm) / slowed;
+        let friction = [port.coulomb_nm, port.presliding_rad];
+        let rubbed = after_elastic_friction_rad_s(&mut self.motor_presliding, driven, friction, slowed, dt_s);
+        self.set_speed_rad_s(after_dry_friction_rad_s(rubbed, joint.coulomb_nm, slowed, dt_s));
         self.set_angle(self.theta_motor_rad + dt_s * self.omega_motor_rad_s);
     }
 

@@ -1,6 +1,8 @@
 //! Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
 
-use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+use crate::effect::{
+    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING_RAD, ParameterSpec,
+};
 
 /// Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
 pub struct MotorCoulombFriction;
@@ -9,13 +11,16 @@ static DESCRIPTOR: Descriptor = Descriptor {
     id: "motor_coulomb_friction",
     component: Component::Motor,
     summary: "dry friction in motor or gear",
-    parameters: &[ParameterSpec::linear(
-        "torque_nm",
-        "N·m",
-        [0.0, 20.0],
-        0.08,
-        "friction torque at the input pulley",
-    )],
+    parameters: &[
+        ParameterSpec::linear("torque_nm", "N·m", [0.0, 20.0], 0.08, "friction torque at the input pulley"),
+        ParameterSpec::log(
+            "presliding_rad",
+            "rad",
+            [1e-4, 3e-2],
+            PRESLIDING_RAD,
+            "turn over which it builds up after a reversal",
+        ),
+    ],
     neutral: Some(0.0),
     channels: &[],
 };
@@ -27,5 +32,6 @@ impl Effect for MotorCoulombFriction {
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         port.coulomb_nm += p[0];
+        port.presliding_rad = p[1];
     }
 }
