@@ -5,3 +5,4 @@ pub mod identifiability;
 pub mod objective;
 pub mod recalibrate;
 pub mod solver;
+pub mod typical;

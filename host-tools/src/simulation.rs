@@ -20,15 +20,16 @@ use crate::outcome::Failure;
 use crate::reconstruct::{Motion, moving_average};
 use crate::recording::Recording;
 
-/// Stiffness of the guide in the first pass, N·m/rad: five times that of a joint of this size, so that the angle follows.
-const STIFF_GUIDE_NM_PER_RAD: f64 = 150.0;
+/// Stiffness of the guide in the first pass over that of both tendons at the input pulley, `2 EA/L r1²`: so stiff that the
+/// angle follows.
+const STIFF_GUIDE: f64 = 4.5;
 
-/// Stiffness of the guide in the second pass, N·m/rad.
-const SOFT_GUIDE_NM_PER_RAD: f64 = 50.0;
+/// The same in the second pass.
+const SOFT_GUIDE: f64 = 1.5;
 
-/// Stiffness of the guide on a pulley inside a play of the gear, N·m/rad: that of both tendons or less, so that tensions
-/// there are those of a pulley that nothing turns.
-const PLAY_GUIDE_NM_PER_RAD: f64 = 20.0;
+/// The same on a pulley inside a play of the gear: that of the tendons or less, so that tensions there are those of a pulley
+/// that nothing turns.
+const PLAY_GUIDE: f64 = 0.6;
 
 /// Part of the angle's standard deviation within which the guide does not pull.
 const GUIDE_DEAD_BAND: f64 = 0.3;
@@ -49,6 +50,9 @@ pub struct ReplayInput {
     start_rad: Option<f64>,
     start_rad_s: f64,
     clock_offset_s: f64,
+    /// Stiffness of both tendons at the input pulley, as the model that the input was prepared for has it: a fit moves
+    /// the model, and the guide stays the same.
+    cables_nm_per_rad: f64,
 }
 
 impl ReplayInput {
@@ -97,6 +101,7 @@ impl ReplayInput {
             start_rad,
             start_rad_s: 0.0,
             clock_offset_s: 0.0,
+            cables_nm_per_rad: cables_nm_per_rad(model),
             t_s,
         })
     }
@@ -129,6 +134,7 @@ impl ReplayInput {
             start_rad: self.start_rad,
             start_rad_s: self.start_rad_s,
             clock_offset_s: self.clock_offset_s,
+            cables_nm_per_rad: self.cables_nm_per_rad,
         }
     }
 
@@ -148,6 +154,14 @@ impl ReplayInput {
     pub fn motion(&self) -> Option<&Motion> {
         self.motion.as_ref()
     }
+}
+
+/// `2 EA/L r1²`; zero without tendons.
+fn cables_nm_per_rad(model: &JointModel) -> f64 {
+    let parameters = &model.parameters;
+    parameters.tendon.zip(parameters.pulleys).map_or(0.0, |(tendon, pulleys)| {
+        2.0 * tendon.axial_stiffness_n / tendon.length_m * pulleys.input_radius_m * pulleys.input_radius_m
+    })
 }
 
 /// Predicted channels, one value a sample.
@@ -211,14 +225,16 @@ pub fn replay(model: &JointModel, input: &ReplayInput) -> Result<Prediction, Fai
     let run = Run { model, config: &config, input, theta_in_rad, drive };
     if drive == Drive::GuidedMotor {
         let no_torque = vec![0.0; input.t_s.len()];
-        let first =
-            run.execute(Guide { stiffness_nm_per_rad: STIFF_GUIDE_NM_PER_RAD, ahead_nm: &no_torque }, &[]);
+        let first = run.execute(
+            Guide { stiffness_nm_per_rad: STIFF_GUIDE * input.cables_nm_per_rad, ahead_nm: &no_torque },
+            &[],
+        );
         let mut ahead_nm = first.guide_nm;
         let half = (GUIDE_FILTER_S / median_step_s(&input.t_s)).round() as usize;
         for _ in 0..2 {
             ahead_nm = moving_average(&ahead_nm, half);
         }
-        let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE_NM_PER_RAD, ahead_nm: &ahead_nm };
+        let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE * input.cables_nm_per_rad, ahead_nm: &ahead_nm };
         return Ok(run.execute(guide, &model.outputs));
     }
     Ok(run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }, &model.outputs))
@@ -286,8 +302,11 @@ impl Run<'_> {
                             let error = plant.theta_in_rad() - wanted;
                             let beyond = error - error.clamp(-band, band);
                             if beyond != 0.0 {
-                                step.loose_pulley.torque_nm = -PLAY_GUIDE_NM_PER_RAD * beyond;
-                                step.loose_pulley.stiffness_nm_per_rad = PLAY_GUIDE_NM_PER_RAD;
+                                let stiffness_nm_per_rad = PLAY_GUIDE * input.cables_nm_per_rad;
+                                step.loose_pulley = Outside {
+                                    torque_nm: -stiffness_nm_per_rad * beyond,
+                                    stiffness_nm_per_rad,
+                                };
                             }
                             // The rotor inside a play is not measured; what the pulley does there says nothing of it.
                             if !plant.inside_gear_play() {
@@ -447,5 +466,32 @@ mod tests {
             tried += 1;
         }
         assert_eq!(tried, 5);
+    }
+
+    /// A joint a hundredth as strong answers the same motion with a hundredth of every tension and torque, guide included.
+    #[test]
+    fn a_weaker_joint_is_guided_as_the_strong_one_is() {
+        const SHARE: f64 = 0.01;
+        let mut recording = test_bench::swung(3000);
+        let wave = |k: u32| 0.12 * (4e-3 * f64::from(k)).cos() + 0.05;
+        recording.set(Channel::Duty, (0..3000).map(wave).collect());
+        recording.set(Channel::BusVoltage, vec![24.0; 3000]);
+        let strong = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        assert_eq!(strong.drive().unwrap(), Drive::GuidedMotor);
+        let weak = test_bench::smaller(strong.clone(), SHARE);
+        let mut on_weak = recording.clone();
+        on_weak.set(Channel::BusVoltage, vec![24.0 * SHARE; 3000]);
+        let of_strong = replay(&strong, &ReplayInput::new(&strong, &recording).unwrap()).unwrap();
+        let of_weak = replay(&weak, &ReplayInput::new(&weak, &on_weak).unwrap()).unwrap();
+        let same = |a: &[f64], b: &[f64], share: f64| {
+            let largest = a.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            a.iter().zip(b).all(|(a, b)| (share * a - b).abs() < 1e-6 * share * largest)
+        };
+        for (channel, values) in of_strong.channels() {
+            let share =
+                if channel.role().ends_with("_n") || channel.role().ends_with("_nm") { SHARE } else { 1.0 };
+            assert!(same(values, of_weak.channel(channel).unwrap(), share), "{}", channel.role());
+        }
+        assert!(same(&of_strong.guide_nm, &of_weak.guide_nm, SHARE), "guide");
     }
 }

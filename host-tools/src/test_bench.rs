@@ -2,6 +2,7 @@
 
 use bowden_model::channel::Channel;
 
+use crate::joint_model::JointModel;
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -20,4 +21,27 @@ pub(crate) fn swung(samples: u32) -> Recording {
         recording.set(channel, zero.clone());
     }
     recording
+}
+
+/// A joint that is `share` as strong and as heavy, at the same angles, duties and currents: every torque and force is that share.
+pub(crate) fn smaller(mut model: JointModel, share: f64) -> JointModel {
+    let parameters = &mut model.parameters;
+    if let Some(motor) = &mut parameters.motor {
+        motor.supply_v *= share;
+        motor.resistance_ohm *= share;
+        motor.inductance_h *= share;
+        motor.torque_constant_nm_per_a *= share;
+        motor.rotor_inertia_kg_m2 *= share;
+        motor.viscous_nm_s_per_rad *= share;
+    }
+    if let Some(tendon) = &mut parameters.tendon {
+        tendon.axial_stiffness_n *= share;
+        tendon.pretension_n *= share;
+    }
+    if let Some(load) = &mut parameters.load {
+        load.mass_kg *= share;
+        load.inertia_kg_m2 *= share;
+        load.viscous_nm_s_per_rad *= share;
+    }
+    model
 }

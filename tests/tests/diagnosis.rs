@@ -258,3 +258,59 @@ fn a_parameter_that_is_not_searched_is_not_reported() {
     assert!(effect.parameters.keys().eq(searched.map(|spec| spec.name)), "{:?}", effect.parameters);
     outcome.predicts_within(0.9);
 }
+
+/// A finger that is a twentieth as strong as the bench, at the same angles, duties and currents: every force and torque in its
+/// file and its recording is a twentieth. What is said of it is said of the bench, with a twentieth of the torque.
+#[test]
+fn a_weaker_joint_is_diagnosed_as_the_strong_one_is() {
+    const SHARE: f64 = 0.05;
+    let case = Case::new(
+        "case",
+        vec![MotorCoulombFriction { torque_nm: 0.15, breakaway_rad: 2e-3 }.into()],
+        101,
+        3.0,
+    );
+    let strong = recording_of(&case.train(MotionKind::Lab, SECONDS).unwrap());
+    let mut weak = Recording::new("finger", strong.t_s().to_vec());
+    for channel in Channel::ALL {
+        if let Some(values) = strong.channel(channel) {
+            let scaled = Channel::TENSIONS.contains(&channel) || channel == Channel::BusVoltage;
+            weak.set(
+                channel,
+                values.iter().map(|value| if scaled { SHARE * value } else { *value }).collect(),
+            );
+        }
+    }
+    let rig = Rig::parse(&finger(&case.rig_toml(), SHARE), "finger.toml").unwrap();
+    let found = diagnose(&rig, &[weak], &[], &[], &Quiet).unwrap().findings.diagnosis;
+    println!("{}\n  {:?}", found.summary, found.effects);
+    let [effect] = found.effects.as_slice() else { panic!("one effect expected: {:?}", found.effects) };
+    assert_eq!(effect.id, "motor_coulomb_friction");
+    let torque_nm = effect.parameters["torque_nm"].value;
+    assert!((torque_nm / (0.15 * SHARE) - 1.0).abs() < 0.15, "{torque_nm} N·m");
+}
+
+/// The rig file with every force, torque, voltage and resistance times `share`.
+fn finger(rig_toml: &str, share: f64) -> String {
+    const SCALED: [&str; 12] = [
+        "supply_v",
+        "resistance_ohm",
+        "inductance_h",
+        "torque_constant_nm_per_a",
+        "rotor_inertia_kg_m2",
+        "viscous_nm_s_per_rad",
+        "axial_stiffness_n",
+        "pretension_n",
+        "mass_kg",
+        "inertia_kg_m2",
+        "tension_full_scale_n",
+        "tension_noise_n",
+    ];
+    let line = |line: &str| match line.split_once(" = ") {
+        Some((name, value)) if SCALED.contains(&name) => {
+            format!("{name} = {:?}\n", share * value.parse::<f64>().unwrap())
+        }
+        _ => format!("{line}\n"),
+    };
+    rig_toml.lines().map(line).collect()
+}

@@ -8,6 +8,7 @@ use bowden_model::effect::{ActiveEffect, Component, Descriptor, ParameterSpec, T
 use bowden_model::effects::CATALOGUE;
 
 use crate::fit::objective::{Objective, Series};
+use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
 use crate::simulation::Prediction;
 
@@ -55,7 +56,7 @@ pub fn candidates(
             if contained {
                 continue;
             }
-            let base = ActiveEffect { target, ..ActiveEffect::with_defaults(effect) };
+            let base = ActiveEffect { target, ..sized(model, effect) };
             let starts = starts(base, model, objective, predictions);
             if !starts.is_empty() {
                 found.push(Candidate { starts });
@@ -124,15 +125,13 @@ fn starts(
         "sensor_lag" => [0.01, 0.05].map(|lag| base.with("time_constant_s", lag)).to_vec(),
         _ => match (strength, onset) {
             (None, _) => vec![base],
-            (Some(strength), Some(onset)) => {
-                onset_starts(base, onset, strength.default, objective.duration_s())
-            }
+            (Some(_), Some(onset)) => onset_starts(base, onset, objective.duration_s()),
             (Some(strength), None) => {
                 // What has either sign goes nearly with its strength; screening finds the sign.
                 let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &[0.4, 1.0, 2.5] };
                 let values: Vec<f64> = factors
                     .iter()
-                    .map(|factor| from_neutral(base, strength.default, *factor))
+                    .map(|factor| from_neutral(base, *factor))
                     .map(|value| value.clamp(strength.lower, strength.upper))
                     .collect();
                 steady_starts(base, &values)
@@ -141,19 +140,12 @@ fn starts(
     }
 }
 
-/// The given strength at moments spread over the recordings; screening finds the sign.
-fn onset_starts(
-    base: ActiveEffect,
-    onset: &ParameterSpec,
-    strength: f64,
-    duration_s: f64,
-) -> Vec<ActiveEffect> {
+/// At moments spread over the recordings; screening finds the sign.
+fn onset_starts(base: ActiveEffect, onset: &ParameterSpec, duration_s: f64) -> Vec<ActiveEffect> {
     (0..ONSETS)
         .map(|k| {
-            let at = base
-                .with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
-                .with("duration_s", duration_s / 6.0);
-            with_strength(at, strength)
+            base.with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
+                .with("duration_s", duration_s / 6.0)
         })
         .collect()
 }
@@ -178,10 +170,10 @@ fn with_strength(mut effect: ActiveEffect, value: f64) -> ActiveEffect {
     effect
 }
 
-/// The default strength, with its distance from no effect scaled by `factor`.
-fn from_neutral(base: ActiveEffect, default: f64, factor: f64) -> f64 {
+/// The usual strength, with its distance from no effect scaled by `factor`.
+fn from_neutral(base: ActiveEffect, factor: f64) -> f64 {
     let neutral = base.descriptor().neutral.unwrap_or(0.0);
-    neutral + factor * (default - neutral)
+    neutral + factor * (base.parameters[0] - neutral)
 }
 
 /// Amplitude, period and phase of a torque locked to an angle, by least squares over every whole period.
@@ -316,10 +308,10 @@ fn end_stop_starts(base: ActiveEffect, model: &JointModel, objective: &Objective
         .copied()
         .collect();
     let (low, high) = travel.iter().fold((0.0_f64, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
-    [(0.95, 20.0), (0.8, 20.0), (0.8, 3.0), (0.6, 3.0)]
+    [(0.95, 1.0), (0.8, 1.0), (0.8, 0.15), (0.6, 0.15)]
         .iter()
-        .flat_map(|(share, stiffness_nm_per_rad)| {
-            let base = base.with("stiffness_nm_per_rad", *stiffness_nm_per_rad);
+        .flat_map(|(share, hardness)| {
+            let base = base.with("stiffness_nm_per_rad", hardness * base.parameters[0]);
             [base.with("stop_rad", share * high), base.with("stop_rad", share * low)]
         })
         .filter(|start| start.parameters[1].abs() > 1e-3)

@@ -27,7 +27,7 @@ const SPREAD: f64 = 0.5;
 const EXHAUSTED: f64 = 0.99;
 
 static ORDINARY: [Ordinary; 2] = [
-    // Travel of a contact before it slips, m: 9 to 14 µm came out of the virtual bench, whose bristles give way over 7.5 µm.
+    // Travel of a contact before it slips, m: 6 to 16 µm came out of virtual benches, whose bristles give way over 7.5 µm.
     Ordinary {
         id: "presliding_compliance",
         sizes: |model| {

@@ -9,6 +9,7 @@ use super::layout::{Layout, largest_ordinary};
 use super::screening::{Present, screen};
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_for_ranking, solve_in_rounds};
+use crate::fit::typical::typical;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
@@ -375,20 +376,19 @@ pub fn worthwhile(before: f64, after: f64) -> bool {
 fn negligible(believed: &JointModel, effect: &ActiveEffect) -> bool {
     let descriptor = effect.descriptor();
     let Some(strength) = descriptor.parameters.first() else { return false };
+    let usual = typical(believed, descriptor.component, strength);
     let value = effect.parameters[0];
     if largest_ordinary(believed, descriptor.id).is_some_and(|largest| value <= largest) {
         return true;
     }
     match descriptor.id {
         // Friction that hardly falls with speed is dry friction, which has a name of its own.
-        "motor_stribeck_friction" => {
-            value < (0.3 * effect.parameters[2]).max(NAMED_STRENGTH * strength.default)
-        }
+        "motor_stribeck_friction" => value < (0.3 * effect.parameters[2]).max(NAMED_STRENGTH * usual),
         "sheath_stribeck_friction" if effect.parameters[1] < SLOWEST_FALL_M_S => true,
         // The typical offset depends on the channel; the loss alone decides.
         "sensor_offset" => false,
-        _ => descriptor.neutral.is_some_and(|neutral| {
-            (value - neutral).abs() < NAMED_STRENGTH * (strength.default - neutral).abs()
-        }),
+        _ => descriptor
+            .neutral
+            .is_some_and(|neutral| (value - neutral).abs() < NAMED_STRENGTH * (usual - neutral).abs()),
     }
 }

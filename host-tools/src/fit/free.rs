@@ -3,6 +3,7 @@
 use bowden_model::effect::{ParameterSpec, Scale};
 use bowden_model::parameters::{NOMINAL_PARAMETERS, NominalParameter};
 
+use super::typical::typical;
 use crate::joint_model::JointModel;
 
 /// Where a free parameter stands in a model.
@@ -58,7 +59,9 @@ impl Free {
         let start = active.parameters[parameter];
         let size = match spec.scale {
             Scale::Log => 1.0,
-            Scale::Linear if spec.default != 0.0 => spec.default.abs(),
+            Scale::Linear if spec.default != 0.0 => {
+                typical(model, active.descriptor().component, &spec).abs()
+            }
             Scale::Linear => 0.1 * (spec.upper - spec.lower),
         };
         Some(Self {
