@@ -141,10 +141,13 @@ pub fn select(
         let Some((place, _)) = beside.iter().enumerate().min_by(best_first) else { break };
         let with_ordinary = beside.remove(place);
         let best = fits.remove(place);
-        // What does no better than the ordinary in its place, and adds nothing beside it, is not found.
-        let replaces = best.loss < present.loss;
-        if !worthwhile(before.loss, best.loss) || !(replaces || worthwhile(present.loss, with_ordinary.loss))
-        {
+        let losses = Losses {
+            before: before.loss,
+            with: best.loss,
+            ordinary: present.loss,
+            with_both: with_ordinary.loss,
+        };
+        if !losses.found() {
             break;
         }
         let tried = |fitted: &Fitted, heldout_loss: f64| Tried {
@@ -153,7 +156,7 @@ pub fn select(
             heldout_loss,
         };
         let Tried { effect, model, heldout_loss: loss_after } = tried(&best, with_ordinary.loss);
-        let loss_before = if replaces { before.loss } else { present.loss };
+        let loss_before = if losses.replaces_ordinary() { before.loss } else { present.loss };
         // Those that were not fitted beside the ordinary are taken to gain by it as the best did.
         let gains = with_ordinary.loss / best.loss;
         let loss_of = |(other, fitted): (usize, &Fitted)| {
@@ -171,6 +174,32 @@ pub fn select(
     let searched = present.solution.model;
     let ordinary = present.layout.ordinary(&searched).to_vec();
     Ok(Selected { baseline, searched, ordinary, model, chosen, rounds, complete: !progress.interrupted() })
+}
+
+/// Held-out losses of a round in which an ordinary effect may have been left out, because it had grown as large as it may be.
+#[derive(Clone, Copy)]
+struct Losses {
+    /// Without it, before the round.
+    before: f64,
+    /// Without it, with the candidate.
+    with: f64,
+    /// With it, before the round.
+    ordinary: f64,
+    /// With it and the candidate.
+    with_both: f64,
+}
+
+impl Losses {
+    /// Whether the candidate is found: it is worth a name, and either does better than the ordinary in its place or is worth
+    /// a name beside it.
+    fn found(&self) -> bool {
+        worthwhile(self.before, self.with)
+            && (self.replaces_ordinary() || worthwhile(self.ordinary, self.with_both))
+    }
+
+    fn replaces_ordinary(&self) -> bool {
+        self.with < self.ordinary
+    }
 }
 
 /// A fitted model, whose effects are whose, and how well it does on held-out data.
@@ -390,5 +419,30 @@ fn negligible(believed: &JointModel, effect: &ActiveEffect) -> bool {
         _ => descriptor
             .neutral
             .is_some_and(|neutral| (value - neutral).abs() < NAMED_STRENGTH * (usual - neutral).abs()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Losses;
+
+    #[test]
+    fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
+        for (losses, found) in [
+            // Nothing was left out.
+            ([1.0, 0.8, 1.0, 0.8], true),
+            ([1.0, 0.9, 1.0, 0.9], false),
+            // Dry friction beyond the ordinary: it takes the place of that.
+            ([1.2, 0.6, 0.7, 0.6], true),
+            // Viscous friction beside dry friction, neither of which does alone.
+            ([1.03, 0.71, 0.67, 0.48], true),
+            // What imitates the ordinary, does no better and adds nothing.
+            ([1.03, 0.71, 0.67, 0.65], false),
+            // What helps beside it and does nothing alone is taken for chance.
+            ([1.03, 1.0, 0.67, 0.48], false),
+        ] {
+            let [before, with, ordinary, with_both] = losses;
+            assert_eq!(Losses { before, with, ordinary, with_both }.found(), found, "{losses:?}");
+        }
     }
 }
