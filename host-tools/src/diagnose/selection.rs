@@ -102,6 +102,8 @@ pub struct Chosen {
 pub struct Selected {
     /// Model with nominal parameters recalibrated, without any new effect.
     pub baseline: Solution,
+    /// The same with what is ordinary.
+    pub plain: JointModel,
     /// Model that the search ended with: all chosen effects and what is ordinary.
     pub searched: JointModel,
     /// What is ordinary, as it was last fitted.
@@ -116,6 +118,14 @@ pub struct Selected {
     pub complete: bool,
 }
 
+impl Selected {
+    /// The same search with nothing found.
+    #[must_use]
+    pub fn withdrawn(self) -> Self {
+        Self { searched: self.plain.clone(), model: self.baseline.model.clone(), chosen: Vec::new(), ..self }
+    }
+}
+
 /// Finds the effects that improve the held-out data.
 ///
 /// # Errors
@@ -128,6 +138,7 @@ pub fn select(
 ) -> Result<Selected, Failure> {
     let search = Search { objective, believed: model, asked, progress };
     let (baseline, mut present) = search.baseline()?;
+    let plain = present.solution.model.clone();
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut rounds = Vec::new();
     while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
@@ -173,7 +184,16 @@ pub fn select(
     let model = present.without_ordinary();
     let searched = present.solution.model;
     let ordinary = present.layout.ordinary(&searched).to_vec();
-    Ok(Selected { baseline, searched, ordinary, model, chosen, rounds, complete: !progress.interrupted() })
+    Ok(Selected {
+        baseline,
+        plain,
+        searched,
+        ordinary,
+        model,
+        chosen,
+        rounds,
+        complete: !progress.interrupted(),
+    })
 }
 
 /// Held-out losses of a round in which an ordinary effect may have been left out, because it had grown as large as it may be.

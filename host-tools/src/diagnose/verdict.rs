@@ -85,6 +85,27 @@ pub struct Recalibrated {
     pub at_bound: bool,
 }
 
+/// Relative change from which on a parameter counts as wrong: what a data sheet or a balance tells, motor and load, and what
+/// changes from one mounting to the next, friction, stiffness and pretension. On virtual benches that are 3 % off their
+/// files and hide nothing, motor and load come out up to 5 % off and the others up to 12 %.
+const WRONG: [(&str, f64); 2] = [("motor.", 0.1), ("load.", 0.1)];
+const WRONG_OTHERWISE: f64 = 0.15;
+
+impl Recalibrated {
+    /// Relative change against the rig file.
+    #[must_use]
+    pub fn change(&self) -> f64 {
+        self.fitted / self.nominal - 1.0
+    }
+
+    /// Whether the rig file is wrong about it, and not just by what benches usually are.
+    #[must_use]
+    pub fn is_wrong(&self) -> bool {
+        let usual = WRONG.iter().find(|(section, _)| self.parameter.starts_with(section));
+        self.change().abs() > usual.map_or(WRONG_OTHERWISE, |(_, usual)| *usual)
+    }
+}
+
 /// Where recalibrated simulation and recording differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mismatch {
@@ -331,4 +352,31 @@ pub struct Findings {
     pub traces: Vec<Trace>,
     /// Residuals by regime.
     pub regimes: Vec<RegimeResidual>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Recalibrated;
+
+    #[test]
+    fn what_a_data_sheet_tells_is_wrong_earlier_than_what_a_mounting_changes() {
+        for (parameter, fitted, wrong) in [
+            ("motor.torque_constant_nm_per_a", 1.12, true),
+            ("motor.torque_constant_nm_per_a", 0.92, false),
+            ("load.mass_kg", 0.88, true),
+            ("sheath.friction_coefficient", 1.12, false),
+            ("sheath.friction_coefficient", 0.84, true),
+            ("tendon.pretension_n", 0.88, false),
+        ] {
+            let found = Recalibrated {
+                parameter: parameter.to_owned(),
+                nominal: 1.0,
+                fitted,
+                std: None,
+                unit: "1".to_owned(),
+                at_bound: false,
+            };
+            assert_eq!(found.is_wrong(), wrong, "{parameter} {fitted}");
+        }
+    }
 }

@@ -138,11 +138,12 @@ pub(super) fn summary(
 ) -> String {
     let changed: Vec<String> = recalibrated
         .iter()
-        .filter(|p| (p.fitted / p.nominal - 1.0).abs() > super::WRONG_PARAMETER)
-        .map(|p| format!("{} {:+.0} %", p.parameter, 100.0 * (p.fitted / p.nominal - 1.0)))
+        .filter(|p| p.is_wrong())
+        .map(|p| format!("{} {:+.0} %", p.parameter, 100.0 * p.change()))
         .collect();
     let parameters = if changed.is_empty() {
-        "All nominal parameters are within 15 % of the rig file.".to_owned()
+        "Motor and load are within 10 % of the rig file, friction, stiffness and pretension within 15 %."
+            .to_owned()
     } else {
         format!("Parameters that were off: {}.", changed.join(", "))
     };
