@@ -132,6 +132,8 @@ fn prove(options: &Options) -> Result<bool, String> {
         Some(rivals) => Some((rivals, Log::open(&folder.join("rivals.jsonl"))?)),
         None => None,
     };
+    // A run takes hours, in which the workspace may go on.
+    let commit = commit();
     let work = Work { tool: &tool, log: &log, rivals: rivals.as_ref(), options, folder: &folder };
     let (outcomes, rival_outcomes) = work.all(&plans, jobs)?;
 
@@ -139,7 +141,7 @@ fn prove(options: &Options) -> Result<bool, String> {
     let summary = Summary::of(outcomes);
     let provenance = Provenance {
         date: time::OffsetDateTime::now_utc().date().to_string(),
-        commit: commit(),
+        commit,
         machine: machine(processors),
         tool: tool.version(),
         threads,
@@ -268,11 +270,10 @@ fn line(outcome: &Outcome) -> String {
     )
 }
 
-/// Commit of the workspace, with a word where files differ from it.
+/// Commit of the workspace that the run is started in, with a word where files differ from it.
 fn commit() -> String {
     let git = |arguments: &[&str]| {
-        let out =
-            Command::new("git").current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output().ok()?;
+        let out = Command::new("git").args(arguments).output().ok()?;
         out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_owned())
     };
     let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) else { return "not known".to_owned() };
