@@ -1,6 +1,7 @@
 //! The bench that unit tests share.
 
 use bowden_model::channel::Channel;
+use bowden_model::parameters::NOMINAL_PARAMETERS;
 
 use crate::joint_model::JointModel;
 use crate::recording::Recording;
@@ -25,23 +26,11 @@ pub(crate) fn swung(samples: u32) -> Recording {
 
 /// A joint that is `share` as strong and as heavy, at the same angles, duties and currents: every torque and force is that share.
 pub(crate) fn smaller(mut model: JointModel, share: f64) -> JointModel {
-    let parameters = &mut model.parameters;
-    if let Some(motor) = &mut parameters.motor {
-        motor.supply_v *= share;
-        motor.resistance_ohm *= share;
-        motor.inductance_h *= share;
-        motor.torque_constant_nm_per_a *= share;
-        motor.rotor_inertia_kg_m2 *= share;
-        motor.viscous_nm_s_per_rad *= share;
-    }
-    if let Some(tendon) = &mut parameters.tendon {
-        tendon.axial_stiffness_n *= share;
-        tendon.pretension_n *= share;
-    }
-    if let Some(load) = &mut parameters.load {
-        load.mass_kg *= share;
-        load.inertia_kg_m2 *= share;
-        load.viscous_nm_s_per_rad *= share;
+    const SCALED: [&str; 8] = ["V", "Ω", "H", "N·m/A", "kg·m²", "N·m·s/rad", "N", "kg"];
+    for parameter in NOMINAL_PARAMETERS.iter().filter(|parameter| SCALED.contains(&parameter.spec.unit)) {
+        if let Some(value) = parameter.get(&model.parameters) {
+            parameter.set(&mut model.parameters, share * value);
+        }
     }
     model
 }
