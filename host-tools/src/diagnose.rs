@@ -118,8 +118,11 @@ pub fn diagnose(
     let mut last = refined(&selected.model)?;
     let recalibrated = objective.predict(&at_full_resolution(&selected.baseline.model, &model))?;
     let heldout_loss = |residuals: &Residuals| objective.mean_loss(residuals, Part::HeldOut);
-    let before_loss = heldout_loss(&objective.compare(&recalibrated));
-    if selected.complete && !selected.chosen.is_empty() && !pays(before_loss, heldout_loss(&last.residuals)) {
+    let recalibrated_loss = heldout_loss(&objective.compare(&recalibrated));
+    if selected.complete
+        && !selected.chosen.is_empty()
+        && !pays(recalibrated_loss, heldout_loss(&last.residuals))
+    {
         selected = selected.withdrawn();
         last = refined(&selected.model)?;
     }

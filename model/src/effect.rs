@@ -159,7 +159,7 @@ pub struct DrivePort {
 }
 
 /// Turn at the input pulley over which the dry friction of a motor and its gear usually builds up after a reversal, rad:
-/// balls, seals and teeth give way elastically by some ten thousandths of a turn.
+/// balls, seals and teeth give way elastically by about one ten-thousandth of a turn.
 pub const PRESLIDING_RAD: f64 = 5e-4;
 
 /// Mechanical side of the motor, seen at the input pulley.

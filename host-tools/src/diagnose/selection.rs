@@ -1,6 +1,8 @@
 //! Which effects the data ask for: forward, the best candidate at a time, judged on what the fit has not seen; then
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 
+use std::cmp::Ordering;
+
 use bowden_model::effect::ActiveEffect;
 use rayon::prelude::*;
 
@@ -122,7 +124,14 @@ impl Selected {
     /// The same search with nothing found.
     #[must_use]
     pub fn withdrawn(self) -> Self {
-        Self { searched: self.plain.clone(), model: self.baseline.model.clone(), chosen: Vec::new(), ..self }
+        let ordinary = self.plain.effects[self.baseline.model.effects.len()..].to_vec();
+        Self {
+            searched: self.plain.clone(),
+            model: self.baseline.model.clone(),
+            ordinary,
+            chosen: Vec::new(),
+            ..self
+        }
     }
 }
 
@@ -143,40 +152,11 @@ pub fn select(
     let mut rounds = Vec::new();
     while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
         let before = search.without_exhausted(&present)?;
-        let (record, mut fits) = search.one_more(&before)?;
+        let (record, fits) = search.one_more(&before)?;
         rounds.push(Round { loss_before: before.loss, candidates: record });
-        let mut beside = search.beside_ordinary(&before, &present, &fits)?;
-        let best_first = |(_, a): &(usize, &Fitted), (_, b): &(usize, &Fitted)| {
-            a.handicapped().total_cmp(&b.handicapped())
-        };
-        let Some((place, _)) = beside.iter().enumerate().min_by(best_first) else { break };
-        let with_ordinary = beside.remove(place);
-        let best = fits.remove(place);
-        let losses = Losses {
-            before: before.loss,
-            with: best.loss,
-            ordinary: present.loss,
-            with_both: with_ordinary.loss,
-        };
-        if !losses.found() {
-            break;
-        }
-        let tried = |fitted: &Fitted, heldout_loss: f64| Tried {
-            effect: fitted.newest(),
-            model: fitted.without_ordinary(),
-            heldout_loss,
-        };
-        let Tried { effect, model, heldout_loss: loss_after } = tried(&best, with_ordinary.loss);
-        let loss_before = if losses.replaces_ordinary() { before.loss } else { present.loss };
-        // Those that were not fitted beside the ordinary are taken to gain by it as the best did.
-        let gains = with_ordinary.loss / best.loss;
-        let loss_of = |(other, fitted): (usize, &Fitted)| {
-            tried(fitted, beside.get(other).map_or(gains * fitted.loss, |beside| beside.loss))
-        };
-        let mut others: Vec<Tried> = fits.iter().enumerate().map(loss_of).collect();
-        others.sort_by(|a, b| a.heldout_loss.total_cmp(&b.heldout_loss));
-        chosen.push(Chosen { effect, model, loss_before, loss_after, others });
-        present = with_ordinary;
+        let Some((found, with)) = search.found(&before, &present, fits)? else { break };
+        chosen.push(found);
+        present = with;
     }
     if !progress.interrupted() {
         search.prune(&mut present, &mut chosen)?;
@@ -212,12 +192,12 @@ struct Losses {
 impl Losses {
     /// Whether the candidate is found: it is worth a name, and either does better than the ordinary in its place or is worth
     /// a name beside it.
-    fn found(&self) -> bool {
+    fn found(self) -> bool {
         worthwhile(self.before, self.with)
             && (self.replaces_ordinary() || worthwhile(self.ordinary, self.with_both))
     }
 
-    fn replaces_ordinary(&self) -> bool {
+    fn replaces_ordinary(self) -> bool {
         self.with < self.ordinary
     }
 }
@@ -245,6 +225,15 @@ impl Fitted {
     /// Held-out loss with the advantage that simpler effects get.
     fn handicapped(&self) -> f64 {
         self.loss * (1.0 + LOSS_PER_PARAMETER * self.newest().descriptor().parameters.len() as f64)
+    }
+
+    fn best_first(&self, other: &Self) -> Ordering {
+        self.handicapped().total_cmp(&other.handicapped())
+    }
+
+    /// What is told of it as a candidate.
+    fn tried(&self, heldout_loss: f64) -> Tried {
+        Tried { effect: self.newest(), model: self.without_ordinary(), heldout_loss }
     }
 }
 
@@ -284,20 +273,52 @@ impl Search<'_> {
         self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])
     }
 
-    /// The first of `fits`, which stand best first, with what is ordinary beside them. Where that was left out of the round,
-    /// because it had grown as large as it may be, it may stand for a part of what is missing, and the best without it
-    /// need not be the best with it.
-    fn beside_ordinary(
+    /// The best of `fits`, which stand best first and beside `before`, if it is found: how it was chosen, and its fit with
+    /// what is ordinary beside it.
+    ///
+    /// Where the ordinary was left out of the round, because it had grown as large as it may be, it may stand for a part
+    /// of what is missing, and the best without it need not be the best with it: all finalists are fitted with it.
+    fn found(
         &self,
         before: &Fitted,
         present: &Fitted,
-        fits: &[Fitted],
-    ) -> Result<Vec<Fitted>, Failure> {
+        mut fits: Vec<Fitted>,
+    ) -> Result<Option<(Chosen, Fitted)>, Failure> {
         let finalists = if before.layout == present.layout { 1 } else { FINALISTS };
-        fits[..finalists.min(fits.len())]
+        let finalists = &fits[..finalists.min(fits.len())];
+        if !finalists.iter().any(|fitted| worthwhile(before.loss, fitted.loss)) {
+            return Ok(None);
+        }
+        let mut beside: Vec<Fitted> = finalists
             .par_iter()
             .map(|fitted| self.with_ordinary(fitted.clone()))
-            .collect()
+            .collect::<Result<_, Failure>>()?;
+        let first = beside.iter().enumerate().min_by(|(_, a), (_, b)| a.best_first(b));
+        let Some((place, _)) = first else { return Ok(None) };
+        let with_ordinary = beside.remove(place);
+        let best = fits.remove(place);
+        let losses = Losses {
+            before: before.loss,
+            with: best.loss,
+            ordinary: present.loss,
+            with_both: with_ordinary.loss,
+        };
+        if !losses.found() {
+            return Ok(None);
+        }
+        // Those that were not fitted beside the ordinary are taken to gain by it as the best did.
+        let gains = with_ordinary.loss / best.loss;
+        let mut others: Vec<Tried> = fits
+            .iter()
+            .enumerate()
+            .map(|(other, fitted)| {
+                fitted.tried(beside.get(other).map_or(gains * fitted.loss, |beside| beside.loss))
+            })
+            .collect();
+        others.sort_by(|a, b| a.heldout_loss.total_cmp(&b.heldout_loss));
+        let Tried { effect, model, heldout_loss: loss_after } = best.tried(with_ordinary.loss);
+        let loss_before = if losses.replaces_ordinary() { before.loss } else { present.loss };
+        Ok(Some((Chosen { effect, model, loss_before, loss_after, others }, with_ordinary)))
     }
 
     /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
@@ -331,7 +352,7 @@ impl Search<'_> {
             fits?.into_iter().enumerate().filter_map(|(place, fitted)| Some((place, fitted?))).collect();
         let best_first = |fits: &mut Vec<(usize, Fitted)>| {
             fits.retain(|(_, fitted)| !negligible(self.believed, &fitted.newest()));
-            fits.sort_by(|(_, a), (_, b)| a.handicapped().total_cmp(&b.handicapped()));
+            fits.sort_by(|(_, a), (_, b)| a.best_first(b));
         };
         let mut keep = |place: usize, fitted: &Fitted| {
             record[place].effect = fitted.newest();
