@@ -75,7 +75,7 @@ fn described(samples: &Samples, left: &Left, forms: &[(Shape, Fitted)]) -> Unexp
     let mut depends_on: Vec<String> = Vec::new();
     for (shape, _) in forms {
         let factor = match shape {
-            Shape::Curve { times: Factor::Direction, .. } => Some(Variable::Speed),
+            _ if shape.turns() => Some(Variable::Speed),
             Shape::Curve { times: Factor::Current, .. } | Shape::Wave { times: Factor::Current, .. } => {
                 Some(Variable::Current)
             }
@@ -119,7 +119,6 @@ fn free_form(samples: &Samples, left: &Left, shape: Shape, fitted: &Fitted) -> F
         let points = shape.drawn(samples, fitted, direction);
         points.into_iter().map(|(x, value)| [x, left.scale * value]).collect()
     };
-    let turns = matches!(shape, Shape::Curve { times: Factor::Direction, .. });
     FreeForm {
         variable: shape.variable().name().to_owned(),
         variable_unit: shape.variable().unit().to_owned(),
@@ -129,7 +128,7 @@ fn free_form(samples: &Samples, left: &Left, shape: Shape, fitted: &Fitted) -> F
         ),
         unit: super::place::unit_of(left.series).to_owned(),
         points: drawn(1.0),
-        points_backwards: if turns { drawn(-1.0) } else { Vec::new() },
+        points_backwards: if shape.turns() { drawn(-1.0) } else { Vec::new() },
         heldout_rms_before: root(before),
         heldout_rms_after: root(after),
         heldout_share: fitted.share(),
@@ -155,6 +154,11 @@ fn sentence(left: &Left, forms: &[(Shape, Fitted)], free_form: Option<&FreeForm>
             let (period, cycles) = (short(TAU / rate), short(*rate));
             format!("a pattern that repeats every {period} rad of {variable}, {cycles} times a turn")
         }
+        Shape::Spot { at, reach, .. } => format!(
+            "a bump at one place, {variable} from {} to {} rad, that turns with the direction of motion",
+            short(at - reach),
+            short(at + reach)
+        ),
         Shape::Curve { times: Factor::Direction, .. } => {
             format!("a pattern along {variable} that depends on the direction of motion")
         }

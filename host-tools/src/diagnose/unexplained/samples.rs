@@ -16,6 +16,10 @@ const STRETCH_S: f64 = 1.0;
 /// Speed at which a direction counts for three quarters, rad/s: an encoder's count a few samples long is no motion.
 const DIRECTION_RAD_S: f64 = 0.05;
 
+/// Turn of the input pulley over which the sign of a dry friction changes after a reversal, rad: three counts of a 12-bit
+/// encoder, so that one count to and fro is no reversal.
+const TURNING_RAD: f64 = 5e-3;
+
 /// Something that a difference may depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Variable {
@@ -89,6 +93,8 @@ pub(crate) struct Samples {
     pub(crate) third_second: Vec<bool>,
     /// Direction of motion, -1 to 1.
     pub(crate) direction: Vec<f64>,
+    /// Direction of the last motion of the input pulley, -1 to 1, as dry friction keeps it at rest.
+    pub(crate) last_direction: Vec<f64>,
     /// One entry a series.
     pub(crate) left: Vec<Left>,
     variables: Vec<Vec<f64>>,
@@ -168,6 +174,7 @@ impl Samples {
                 }
             }
         }
+        self.last_direction.extend(last_direction(&self.variables[Variable::ThetaIn as usize][first..]));
         for left in &mut self.left {
             let rows = &mut left.plain[first..];
             let centre = mean(rows);
@@ -193,6 +200,7 @@ impl Samples {
             held_out: held.clone(),
             third_second: held,
             direction: speed.iter().map(|speed| (speed / DIRECTION_RAD_S).tanh()).collect(),
+            last_direction: last_direction(theta_rad),
             left,
             variables: vec![
                 theta_rad.to_vec(),
@@ -204,6 +212,21 @@ impl Samples {
             ],
         }
     }
+}
+
+/// Direction that dry friction has at every row of one recording: it follows the angle over [`TURNING_RAD`] and no farther
+/// (Prandtl's element). Zero before the first motion, and where the angle is not known.
+fn last_direction(theta_rad: &[f64]) -> Vec<f64> {
+    let (mut direction, mut last) = (0.0, theta_rad.first().copied().unwrap_or(0.0));
+    let follow = |theta_rad: &f64| {
+        let turned = (theta_rad - last) / TURNING_RAD;
+        last = *theta_rad;
+        if turned.is_finite() {
+            direction = f64::clamp(direction + turned, -1.0, 1.0);
+        }
+        direction
+    };
+    theta_rad.iter().map(follow).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {

@@ -47,32 +47,43 @@ pub(crate) enum Shape {
         /// Multiplied with what; a wave does not turn with the direction.
         times: Factor,
     },
+    /// One bump, `a (1 − ((x − at) / reach)²)²`, whose sign is that of the last motion: what rubs at one place.
+    Spot {
+        /// Of what.
+        of: Variable,
+        /// Its middle.
+        at: f64,
+        /// Half its width.
+        reach: f64,
+    },
 }
 
 /// How well a free form does on rows that it was not fitted to.
 #[derive(Clone, Debug)]
 pub(crate) struct Fitted {
-    /// Mean square of what was there, in squared scales.
-    pub(crate) before: f64,
-    /// Mean square of what is left.
-    pub(crate) after: f64,
+    /// Mean square of what was there, in squared scales, over the rows that the form reaches.
+    before: f64,
+    /// Mean square of what is left there.
+    after: f64,
+    /// Those rows as a part of all that could judge.
+    reached: f64,
     /// Value of the form at every row, in scales; zero where it is not defined.
     pub(crate) form: Vec<f64>,
     /// Coefficients of the first recording, or of all where one set serves all.
     pub(crate) coefficients: Vec<f64>,
-    /// Rows that it was judged on.
+    /// Rows that it was judged on: none that it does not reach.
     pub(crate) judged: Vec<bool>,
 }
 
 impl Fitted {
-    /// Squared scales that it takes off rows that it has not seen.
+    /// Squared scales that it takes off rows that it has not seen, in the mean of all of them.
     pub(crate) fn removed(&self) -> f64 {
-        self.before - self.after
+        self.reached * (self.before - self.after)
     }
 
-    /// That as a share of what was there.
+    /// What it takes off, as a share of what was there where it reaches.
     pub(crate) fn share(&self) -> f64 {
-        if self.before > 0.0 { self.removed() / self.before } else { 0.0 }
+        if self.before > 0.0 { (self.before - self.after) / self.before } else { 0.0 }
     }
 }
 
@@ -80,7 +91,7 @@ impl Shape {
     /// Variable along which it runs.
     pub(crate) const fn variable(self) -> Variable {
         match self {
-            Self::Curve { of, .. } | Self::Wave { of, .. } => of,
+            Self::Curve { of, .. } | Self::Wave { of, .. } | Self::Spot { of, .. } => of,
         }
     }
 
@@ -97,10 +108,11 @@ impl Shape {
                 Some(samples.variable(Variable::Current)?)
             }
             Self::Curve { times: Factor::Direction, .. } => Some(samples.direction.as_slice()),
+            Self::Spot { .. } => Some(samples.last_direction.as_slice()),
             _ => None,
         };
         let alone = self.is_of_one_recording();
-        let judged = if alone { &samples.third_second } else { &samples.held_out };
+        let unseen = if alone { &samples.third_second } else { &samples.held_out };
         let mut form = vec![0.0; samples.len()];
         let mut first = None;
         let mut start = 0;
@@ -115,7 +127,7 @@ impl Shape {
             let count = self.count(ends);
             let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
             let usable = |k: usize| values[k].is_finite();
-            for k in (start..end).filter(|k| usable(*k) && !judged[*k]) {
+            for k in (start..end).filter(|k| usable(*k) && !unseen[*k]) {
                 self.terms(x[k], factor.map_or(1.0, |f| f[k]), ends, &mut terms);
                 for &(i, a) in &terms {
                     right[i] += a * values[k];
@@ -134,25 +146,41 @@ impl Shape {
             first.get_or_insert_with(|| coefficients.iter().copied().collect::<Vec<f64>>());
             start = end;
         }
+        let judged: Vec<bool> = unseen.iter().zip(x).map(|(unseen, x)| *unseen && self.reaches(*x)).collect();
         let (mut before, mut after, mut rows) = (0.0, 0.0, 0.0);
         for k in (0..samples.len()).filter(|k| judged[*k] && values[*k].is_finite()) {
             before += values[k].powi(2);
             after += (values[k] - form[k]).powi(2);
             rows += 1.0;
         }
+        let all = unseen.iter().zip(values).filter(|(unseen, value)| **unseen && value.is_finite()).count();
         (rows > 0.0).then(|| Fitted {
             before: before / rows,
             after: after / rows,
+            reached: rows / all as f64,
             form,
             coefficients: first.unwrap_or_default(),
-            judged: judged.clone(),
+            judged,
         })
+    }
+
+    /// Whether the form says anything at `x`.
+    fn reaches(self, x: f64) -> bool {
+        match self {
+            Self::Spot { at, reach, .. } => (x - at).abs() < reach,
+            Self::Curve { .. } | Self::Wave { .. } => true,
+        }
+    }
+
+    /// Whether the form turns with the direction of motion.
+    pub(crate) const fn turns(self) -> bool {
+        matches!(self, Self::Curve { times: Factor::Direction, .. } | Self::Spot { .. })
     }
 
     /// The form over its variable, for the first recording where each has its own; at direction `direction` for one that
     /// turns with it, for one ampere for one that grows with the current.
     pub(crate) fn drawn(self, samples: &Samples, fitted: &Fitted, direction: f64) -> Vec<(f64, f64)> {
-        /// Points of a wave's period.
+        /// Points of a wave's period, and of a spot.
         const POINTS: usize = 32;
         let Some(x) = samples.variable(self.variable()) else { return Vec::new() };
         let rows = if self.is_of_one_recording() {
@@ -164,9 +192,9 @@ impl Shape {
         let (from, to, points) = match self {
             Self::Curve { .. } => (ends.0, ends.1, self.nodes(ends) - 1),
             Self::Wave { rate, .. } => (0.0, TAU / rate, POINTS),
+            Self::Spot { at, reach, .. } => (at - reach, at + reach, POINTS),
         };
-        let factor =
-            if matches!(self, Self::Curve { times: Factor::Direction, .. }) { direction } else { 1.0 };
+        let factor = if self.turns() { direction } else { 1.0 };
         let mut terms = Vec::new();
         (0..=points)
             .map(|point| {
@@ -183,7 +211,7 @@ impl Shape {
                 (((ends.1 - ends.0) / TIME_NODE_S) as usize + 1).clamp(4, 60)
             }
             Self::Curve { nodes, .. } => nodes.max(2),
-            Self::Wave { .. } => 0,
+            Self::Wave { .. } | Self::Spot { .. } => 0,
         }
     }
 
@@ -192,6 +220,7 @@ impl Shape {
             Self::Curve { times: Factor::Direction, .. } => 2 * self.nodes(ends),
             Self::Curve { .. } => self.nodes(ends),
             Self::Wave { waves, times, .. } => 2 * waves + usize::from(times == Factor::Current),
+            Self::Spot { .. } => 1,
         }
     }
 
@@ -199,6 +228,10 @@ impl Shape {
     fn terms(self, x: f64, factor: f64, ends: (f64, f64), terms: &mut Vec<(usize, f64)>) {
         terms.clear();
         match self {
+            Self::Spot { at, reach, .. } => {
+                let x = (x - at) / reach;
+                terms.push((0, factor * (1.0 - x * x).max(0.0).powi(2)));
+            }
             Self::Wave { rate, waves, times, .. } => {
                 let factor = if times == Factor::Current { factor } else { 1.0 };
                 terms.extend((0..waves).flat_map(|k| {
@@ -281,4 +314,33 @@ fn scan(rows: &Rows, from: f64, step: f64, count: usize) -> Option<f64> {
         }
     }
     best.map(|(_, rate)| rate)
+}
+
+/// Middle of the spot of half width `reach` that takes most off `values`, and how much it takes off the sum of their squares;
+/// `None` where no place is passed often enough, both ways.
+///
+/// `x` are the places of the rows, `directions` the signs that the spot has there.
+pub(super) fn best_spot(x: &[f64], directions: &[f64], values: &[f64], reach: f64) -> Option<(f64, f64)> {
+    /// Rows, weighted with the bump, that a place must have in either direction.
+    const FEWEST_ROWS: f64 = 15.0;
+    /// Places within half a width.
+    const PLACES: f64 = 6.0;
+    let (low, high) = ends_of(x);
+    let count = ((high - low - 2.0 * reach) / reach * PLACES).max(0.0) as usize;
+    let gain = |at: f64| {
+        let (mut along, mut forward, mut backward) = (0.0, 0.0, 0.0);
+        for ((x, direction), value) in x.iter().zip(directions).zip(values) {
+            let place = (x - at) / reach;
+            let bump = direction * (1.0 - place * place).max(0.0).powi(2);
+            along += bump * value;
+            *if bump > 0.0 { &mut forward } else { &mut backward } += bump * bump;
+        }
+        (forward.min(backward) > FEWEST_ROWS).then(|| along * along / (forward + backward))
+    };
+    (0..=count)
+        .filter_map(|place| {
+            let at = low + reach * (1.0 + place as f64 / PLACES);
+            Some((at, gain(at)?))
+        })
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))
 }

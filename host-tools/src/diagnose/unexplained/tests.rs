@@ -151,6 +151,44 @@ fn a_bump_is_drawn_where_it_is_and_as_high_as_it_is() {
     assert!(fitted.share() > 0.3 && shape.fit(&samples, &samples.left[1].soft).unwrap().share() < 0.05);
 }
 
+/// A cable that rubs while it passes 0.1 rad, half a width of 0.12 rad: the tension before the spot holds as much more while the
+/// angle grows as less while it falls, after Dahl over 4 mrad, and the cables beyond it answer together. The mean of
+/// `(1 − x²)⁴` is 128/315, of which amplitude 4 makes 6.5 squared scales beside the 1 of the noise; where a reversal falls into
+/// the spot there is less of it.
+#[test]
+fn what_rubs_at_one_place_is_found_there() {
+    let theta_rad = theta_rad();
+    let rubs = |size: f64| {
+        let (mut last_rad, mut sign) = (0.0, 0.0);
+        let force = move |theta_rad: &f64| {
+            let turned_rad: f64 = theta_rad - last_rad;
+            sign = turned_rad.signum() + (sign - turned_rad.signum()) * (-turned_rad.abs() / 4e-3).exp();
+            last_rad = *theta_rad;
+            let x = (theta_rad - 0.1) / 0.12;
+            if x.abs() < 1.0 { size * sign * (1.0 - x * x).powi(2) } else { 0.0 }
+        };
+        theta_rad.iter().map(force).collect::<Vec<f64>>().into_iter()
+    };
+    let samples = samples(vec![
+        left(Channel::F1, sum(&noise(11), rubs(4.0))),
+        left(Channel::F2, sum(&noise(12), rubs(-2.0))),
+        left(Channel::F4, sum(&noise(13), rubs(-2.0))),
+        left(Channel::ThetaOut, noise(14)),
+    ]);
+    let told = told(&samples);
+    assert_eq!((told.component.as_str(), told.channel.as_str()), ("transmission", "f1_n"));
+    assert_eq!(told.depends_on, ["theta_in_rad", "omega_in_rad_s"]);
+    let form = told.free_form.expect("a form");
+    let share = 16.0 * 128.0 / 315.0 / (16.0 * 128.0 / 315.0 + 1.0);
+    let found = form.heldout_share;
+    assert!(found < share && found > share - 0.12, "share {found} for at most {share}");
+    let middle = |points: &[[f64; 2]]| points[points.len() / 2];
+    let (forward, backward) = (middle(&form.points), middle(&form.points_backwards));
+    assert!((forward[0] - 0.1).abs() < 0.03, "middle {} rad", forward[0]);
+    // 0.5 N a scale.
+    assert!((forward[1] - 2.0).abs() < 0.25 && forward[1] == -backward[1], "{forward:?} {backward:?}");
+}
+
 /// A torque constant that swings by a share s makes the torque wrong by s times what the current makes.
 #[test]
 fn a_swing_that_grows_with_the_current_is_the_motors() {
