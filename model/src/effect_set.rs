@@ -27,6 +27,8 @@ impl core::error::Error for TooManyEffects {}
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EffectSet {
     active: [Option<ActiveEffect>; MAX_ACTIVE],
+    /// Component of each: every step asks for it many times, and its descriptor is behind a call.
+    components: [Option<Component>; MAX_ACTIVE],
     count: usize,
 }
 
@@ -38,7 +40,7 @@ pub const FRESH_STATES: EffectStates = [[0.0; MAX_STATE]; MAX_ACTIVE];
 
 impl EffectSet {
     /// No effects.
-    pub const EMPTY: Self = Self { active: [None; MAX_ACTIVE], count: 0 };
+    pub const EMPTY: Self = Self { active: [None; MAX_ACTIVE], components: [None; MAX_ACTIVE], count: 0 };
 
     /// Adds an effect.
     ///
@@ -47,6 +49,7 @@ impl EffectSet {
     pub fn push(&mut self, effect: ActiveEffect) -> Result<(), TooManyEffects> {
         let slot = self.active.get_mut(self.count).ok_or(TooManyEffects)?;
         *slot = Some(effect);
+        self.components[self.count] = Some(effect.descriptor().component);
         self.count += 1;
         Ok(())
     }
@@ -71,7 +74,7 @@ impl EffectSet {
     /// Whether any effect belongs to `component`.
     #[must_use]
     pub fn touches(&self, component: Component) -> bool {
-        self.iter().any(|effect| effect.descriptor().component == component)
+        self.components[..self.count].contains(&Some(component))
     }
 
     /// Law of sheath friction with these effects, for a rig that says `nominal`; the last effect that has one decides.
@@ -86,8 +89,10 @@ impl EffectSet {
         states: &mut EffectStates,
         mut hook: impl FnMut(&'static dyn Effect, &ActiveEffect, &[f64; MAX_PARAMETERS], &mut EffectState),
     ) {
-        for (active, state) in self.active[..self.count].iter().flatten().zip(states) {
-            if active.descriptor().component == component {
+        for (index, state) in states.iter_mut().enumerate().take(self.count) {
+            if self.components[index] == Some(component)
+                && let Some(active) = &self.active[index]
+            {
                 hook(active.effect, active, &active.parameters, state);
             }
         }
