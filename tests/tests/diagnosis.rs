@@ -195,6 +195,21 @@ fn nothing_concealed() {
     outcome.predicts_within(1.0);
 }
 
+/// A winding that warms up beside sheaths that bend with the pose: its resistance, recalibrated, had taken the place of the
+/// warming, and how much a watt does is not in the rig file.
+#[test]
+fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
+    let plan = plans(1).into_iter().find(|plan| plan.name == "pair/15").unwrap();
+    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
+    let mut found: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
+    found.sort_unstable();
+    assert_eq!(found, ["winding_heating", "wrap_angle_varies_with_pose"]);
+    let resistance = outcome.diagnosis.recalibrated.iter().find(|p| p.parameter == "motor.resistance_ohm");
+    let resistance = resistance.unwrap();
+    assert!((resistance.fitted / resistance.nominal - 1.0).abs() < 0.1, "{resistance:?}");
+    outcome.predicts_within(0.5);
+}
+
 /// On this bench, whose tensions are noisy and whose parameters are wrong, an effect passes the bar of the search, beside what
 /// is ordinary and at its resolution, and takes less than a hundredth off the loss of the rig that is written.
 #[test]
@@ -272,6 +287,22 @@ fn a_parameter_that_is_not_searched_is_not_reported() {
     let searched = find("tendon_slack").unwrap().descriptor().parameters.iter().filter(|spec| spec.searched);
     assert!(effect.parameters.keys().eq(searched.map(|spec| spec.name)), "{:?}", effect.parameters);
     outcome.predicts_within(0.9);
+}
+
+/// However many threads share the work, what is said is the same to the last digit.
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    const SHORT_S: f64 = 8.0;
+    let case = Case::new("case", vec![PretensionLoss { loss: 0.25, onset_s: 4.0 }.into()], 113, 3.0);
+    let training = [recording_of(&case.train(MotionKind::Lab, SHORT_S).unwrap())];
+    let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
+    let found = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| diagnose(&rig, &training, &[], &[], &Quiet).unwrap().findings)
+    };
+    let alone = found(1);
+    assert_eq!(alone.diagnosis.verdict, Verdict::MissingPhysics);
+    assert_eq!(alone, found(3));
 }
 
 /// A finger that is a twentieth as strong as the bench, at the same angles, duties and currents: every force and torque in its

@@ -21,6 +21,15 @@ const LOCKED_PERIODS: std::ops::RangeInclusive<usize> = 2..=240;
 /// Of so many samples one is looked at for it.
 const LOCKED_STRIDE: usize = 5;
 
+/// Strengths, in typical ones, at which an effect is tried that does not go with its strength.
+const STEADY: [f64; 3] = [0.4, 1.0, 2.5];
+
+/// Relative rises of a winding's resistance at which its heating is tried.
+const RISES: [f64; 3] = [0.05, 0.15, 0.45];
+
+/// Angle of rest at which a spring of the joint is tried, either side of zero.
+const REST_RAD: f64 = 0.05;
+
 /// One effect and where to start.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -110,12 +119,22 @@ fn starts(
     match base.descriptor().id {
         "motor_cogging" => cogging_start(base, objective, predictions).into_iter().collect(),
         "joint_torque_ripple" => ripple_start(base, model, objective, predictions).into_iter().collect(),
+        "winding_heating" => heating_starts(base, model, predictions),
         "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
         "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
         "end_stop_contact" => end_stop_starts(base, model, objective),
         // A simulation with a fifth more or less play than there is predicts no better than one without.
         "gear_backlash" => (-6..=6)
             .map(|third| with_strength(base, base.parameters[0] * (f64::from(third) / 3.0).exp2()))
+            .collect(),
+        // Where a harness is at rest it is some degrees off; the torque of that is as much a sign of it as the slope.
+        "joint_spring" => [-REST_RAD, 0.0, REST_RAD]
+            .into_iter()
+            .flat_map(|rest_rad| {
+                STEADY.map(|factor| {
+                    base.with("rest_rad", rest_rad).with("stiffness_nm_per_rad", factor * base.parameters[0])
+                })
+            })
             .collect(),
         // The other two quarters are these with the other sign.
         "encoder_eccentricity" => (0..2)
@@ -128,7 +147,7 @@ fn starts(
             (Some(_), Some(onset)) => onset_starts(base, onset, objective.duration_s()),
             (Some(strength), None) => {
                 // What has either sign goes nearly with its strength; screening finds the sign.
-                let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &[0.4, 1.0, 2.5] };
+                let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &STEADY };
                 let values: Vec<f64> = factors
                     .iter()
                     .map(|factor| from_neutral(base, *factor))
@@ -266,6 +285,24 @@ fn ripple_start(
         let less = |k: usize| radius_m * ((a_predicted[k] - b_predicted[k]) - (a[k] - b[k]));
         Some((0..theta.len()).step_by(LOCKED_STRIDE).map(|k| (theta[k], less(k))).collect())
     })
+}
+
+/// Gains with which the power of the recordings, kept up, would raise the resistance by [`RISES`]: what a watt does to a winding
+/// depends on its size, which the rig file does not tell.
+fn heating_starts(base: ActiveEffect, model: &JointModel, predictions: &[Prediction]) -> Vec<ActiveEffect> {
+    let currents = predictions.iter().filter_map(|prediction| prediction.channel(Channel::MotorCurrent));
+    let (mut squares, mut count) = (0.0, 0.0);
+    for current_a in currents.flatten() {
+        squares += current_a * current_a;
+        count += 1.0;
+    }
+    let resistance_ohm = model.parameters.motor.map_or(0.0, |motor| motor.resistance_ohm);
+    let power_w = resistance_ohm * squares / f64::max(count, 1.0);
+    if power_w <= 0.0 {
+        return vec![base];
+    }
+    let upper = base.descriptor().parameters[0].upper;
+    RISES.map(|rise| with_strength(base, (rise / power_w).min(upper))).to_vec()
 }
 
 /// Offset from the mean difference of the channel.

@@ -4,6 +4,10 @@
 //! With residuals `r` of the present model, slopes `J` over its parameters and residuals `r_c` of a candidate, the loss
 //! after a refit is estimated as `min_b |P (r + b (r_c - r))|²` with the projection `P = 1 - J (JᵀJ)⁻¹ Jᵀ`: exact for an
 //! effect that enters linearly, a ranking for the others; those that it ranks first are simulated at their estimated strength.
+//!
+//! Where a parameter has taken the place of what is missing, as a weight that of a spring, the effect changes much and nearly
+//! all of it is what parameters change too; the little by which the two differ is lost in the curvature of so long a way.
+//! Such a start is simulated once more with the parameters where the slopes would put them.
 
 use bowden_model::effect::{ActiveEffect, Component};
 use nalgebra::{DMatrix, DVector};
@@ -13,7 +17,7 @@ use super::candidates::Candidate;
 use super::layout::Layout;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::{Solution, training_rows};
-use crate::outcome::Failure;
+use crate::joint_model::JointModel;
 use crate::progress::Progress;
 use crate::simulation::Prediction;
 
@@ -27,6 +31,15 @@ const WEAKEST: f64 = 0.15;
 /// Strength, in starting strengths, up to which the linear estimate is followed.
 const STRONGEST: f64 = 3.0;
 
+/// Share of what an effect changes that parameters change as well, from which on it is tried where they make room for it.
+const IN_PLACE_OF: f64 = 0.5;
+
+/// Farthest that a parameter makes room, in the optimiser's coordinate: a factor of two.
+const ROOM: f64 = 0.7;
+
+/// Times that they are asked to; their slopes are those of the present model.
+const ROOM_ROUNDS: usize = 2;
+
 /// A candidate after screening.
 #[derive(Clone, Debug)]
 pub struct Screened {
@@ -34,6 +47,14 @@ pub struct Screened {
     pub start: ActiveEffect,
     /// Estimated share of the present loss that it would take off.
     pub gain: f64,
+    /// Present model without the effect, with parameters that make room for it; `None` for those that it has.
+    pub room: Option<JointModel>,
+}
+
+impl Screened {
+    fn at(start: ActiveEffect, gain: f64) -> Self {
+        Self { start, gain, room: None }
+    }
 }
 
 /// A starting point that was simulated, and what follows from it for another strength.
@@ -50,6 +71,8 @@ impl Judged {
 
 /// What candidates are judged against.
 pub struct Present<'a> {
+    /// What the rig states.
+    pub believed: &'a JointModel,
     /// Model so far, fitted.
     pub solution: &'a Solution,
     /// Whose its effects are.
@@ -68,8 +91,9 @@ pub fn screen(
 ) -> Vec<Screened> {
     let [objective, _] = &objective.split();
     let basis = Basis::new(&present.solution.jacobian);
-    let now = basis.without(&rows(objective, &present.solution.residuals));
-    let background = Background { objective, present, basis, loss_now: now.norm_squared(), now };
+    let rows_now = rows(objective, &present.solution.residuals);
+    let now = basis.without(&rows_now);
+    let background = Background { objective, present, basis, loss_now: now.norm_squared(), now, rows_now };
     let starts: Vec<(usize, ActiveEffect)> = candidates
         .iter()
         .enumerate()
@@ -117,6 +141,8 @@ struct Background<'a> {
     objective: &'a Objective,
     present: &'a Present<'a>,
     basis: Basis,
+    /// Residuals of the present model.
+    rows_now: DVector<f64>,
     /// What the present parameters cannot take off.
     now: DVector<f64>,
     loss_now: f64,
@@ -125,13 +151,12 @@ struct Background<'a> {
 impl Background<'_> {
     fn judge(&self, start: ActiveEffect) -> Option<Judged> {
         let Self { objective, basis, now, .. } = self;
-        let residuals = self.residuals(start).ok()?;
-        if !residuals.is_finite() {
-            return None;
-        }
-        let there = basis.without(&rows(objective, &residuals));
+        let there = rows(objective, &self.residuals(start).filter(Residuals::is_finite)?);
+        let whole_change = (&there - &self.rows_now).norm_squared();
+        let inside = basis.inside(&there);
+        let there = basis.without(&there);
         let gain_of = |loss: f64| 1.0 - loss / self.loss_now.max(f64::MIN_POSITIVE);
-        let at_start = Screened { start, gain: gain_of(there.norm_squared()) };
+        let mut at_start = Screened::at(start, gain_of(there.norm_squared()));
         let direction = &there - now;
         let along = direction.norm_squared();
         let step = if along > 0.0 { -now.dot(&direction) / along } else { 0.0 };
@@ -142,22 +167,53 @@ impl Background<'_> {
             moved.parameters[0] = neutral + step * (start.parameters[0] - neutral);
             let possible = step > 0.0 || moved.parameters[0] >= spec.lower;
             moved.parameters[0] = moved.parameters[0].clamp(spec.lower, spec.upper);
-            possible
-                .then(|| Screened { start: moved, gain: gain_of((now + direction * step).norm_squared()) })
+            let gain = gain_of((now + direction * step).norm_squared());
+            possible.then(|| Screened::at(moved, gain))
         });
+        if along < (1.0 - IN_PLACE_OF) * whole_change {
+            let mut x = DVector::zeros(inside.len());
+            let mut too_much = inside;
+            for _ in 0..ROOM_ROUNDS {
+                x -= basis.steps(&too_much);
+                x.apply(|x| *x = x.clamp(-ROOM, ROOM));
+                let room = self.with_parameters_at(&x);
+                let Some(there) = self.beside(&room, start).filter(Residuals::is_finite) else { break };
+                let there = rows(objective, &there);
+                let gain = gain_of(basis.without(&there).norm_squared());
+                if gain <= at_start.gain {
+                    break;
+                }
+                at_start = Screened { gain, room: Some(room), ..at_start };
+                too_much = basis.inside(&there);
+            }
+        }
         Some(Judged { start: at_start, linear })
     }
 
-    fn residuals(&self, start: ActiveEffect) -> Result<Residuals, Failure> {
-        let Present { solution, layout, predictions } = self.present;
+    /// The present model with its parameters at `x`, in the optimiser's coordinates.
+    fn with_parameters_at(&self, x: &DVector<f64>) -> JointModel {
+        let Present { solution, layout, believed, .. } = self.present;
+        let mut model = solution.model.clone();
+        for (free, x) in layout.free(believed, &solution.model).iter().zip(x.iter()) {
+            free.apply(*x, &mut model);
+        }
+        model
+    }
+
+    fn beside(&self, model: &JointModel, start: ActiveEffect) -> Option<Residuals> {
+        self.objective.residuals(&self.present.layout.with(model, start).1).ok()
+    }
+
+    fn residuals(&self, start: ActiveEffect) -> Option<Residuals> {
+        let Present { solution, predictions, .. } = self.present;
         let model = &solution.model;
         // A sensor that drives nothing changes nothing but what is seen of the same motion.
         let only_seen = start.descriptor().component == Component::Sensors
             && !model.inputs.iter().any(|channel| start.target.includes(*channel));
         if only_seen {
-            self.objective.residuals_seen_through(predictions, start)
+            self.objective.residuals_seen_through(predictions, start).ok()
         } else {
-            self.objective.residuals(&layout.with(model, start).1)
+            self.beside(model, start)
         }
     }
 }
@@ -166,26 +222,50 @@ fn rows(objective: &Objective, residuals: &Residuals) -> DVector<f64> {
     DVector::from_vec(training_rows(objective, residuals))
 }
 
-/// Orthonormal basis of what the present parameters can change.
-struct Basis(DMatrix<f64>);
+/// What the present parameters can change: an orthonormal basis, and what a step of each parameter is in it.
+struct Basis {
+    q: DMatrix<f64>,
+    r: DMatrix<f64>,
+}
 
 impl Basis {
     fn new(jacobian: &DMatrix<f64>) -> Self {
         if jacobian.ncols() == 0 || jacobian.nrows() == 0 {
-            return Self(DMatrix::zeros(0, 0));
+            return Self { q: DMatrix::zeros(0, 0), r: DMatrix::zeros(0, 0) };
         }
-        Self(jacobian.clone().qr().q())
+        let (q, r) = jacobian.clone().qr().unpack();
+        Self { q, r }
     }
 
-    /// The part of `rows` that they cannot take off. The rows of priors, last in the basis, count as zero.
+    /// The part of `rows` that they can take off, in the basis. The rows of priors, last in the basis, count as zero.
+    fn inside(&self, rows: &DVector<f64>) -> DVector<f64> {
+        if self.q.ncols() == 0 {
+            return DVector::zeros(0);
+        }
+        self.q.rows(0, rows.len()).tr_mul(rows)
+    }
+
+    /// The part that they cannot take off.
     fn without(&self, rows: &DVector<f64>) -> DVector<f64> {
-        if self.0.ncols() == 0 {
+        if self.q.ncols() == 0 {
             return rows.clone();
         }
-        let mut extended = rows.clone().resize_vertically(self.0.nrows(), 0.0);
-        let inside = self.0.transpose() * &extended;
-        extended -= &self.0 * inside;
+        let mut extended = rows.clone().resize_vertically(self.q.nrows(), 0.0);
+        extended -= &self.q * self.inside(rows);
         extended
+    }
+
+    /// Steps of the parameters that change what `inside` says; zero for a parameter that changes nothing.
+    fn steps(&self, inside: &DVector<f64>) -> DVector<f64> {
+        let mut steps = DVector::zeros(inside.len());
+        for i in (0..inside.len()).rev() {
+            let others: f64 = (i + 1..inside.len()).map(|j| self.r[(i, j)] * steps[j]).sum();
+            let own = self.r[(i, i)];
+            if own.abs() > 1e-9 * self.r.amax() {
+                steps[i] = (inside[i] - others) / own;
+            }
+        }
+        steps
     }
 }
 
@@ -194,11 +274,39 @@ mod tests {
     use bowden_model::effects::find;
 
     use super::*;
-    use crate::fit::solver::solve_in_rounds;
-    use crate::joint_model::JointModel;
+    use crate::fit::solver::{COARSE_STEP, FINE_STEP, solve_in_rounds};
     use crate::progress::Quiet;
+    use crate::recording::Recording;
     use crate::simulation::{ReplayInput, replay};
     use crate::test_bench;
+
+    /// `model` with one more effect answers the motion of `recording`, which then holds that.
+    fn record(model: &JointModel, effect: ActiveEffect, recording: &mut Recording) {
+        let mut real = model.clone();
+        real.effects.push(effect);
+        let measured = replay(&real, &ReplayInput::new(model, recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+    }
+
+    /// What screening makes of one candidate beside `model`, recalibrated in `rounds`.
+    fn screened(
+        model: &JointModel,
+        recording: Recording,
+        rounds: &[f64],
+        starts: Vec<ActiveEffect>,
+    ) -> (Screened, JointModel) {
+        let objective = Objective::new(model, &[recording], &[], true).unwrap();
+        let layout = Layout::of(model);
+        let free = layout.free(model, model);
+        let solution = solve_in_rounds(&objective, model, &free, 5, rounds).unwrap();
+        let predictions = objective.predict(&solution.model).unwrap();
+        let present =
+            Present { believed: model, solution: &solution, layout: &layout, predictions: &predictions };
+        let found = screen(&objective, &present, &[Candidate { starts }], &Quiet).remove(0);
+        (found, solution.model.clone())
+    }
 
     /// What an effect of either sign is tried at says where it really is, on the other side and beyond what is trusted.
     #[test]
@@ -207,21 +315,29 @@ mod tests {
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let start = ActiveEffect::with_defaults(find("asymmetric_friction").unwrap());
         let strong = -1.1 * STRONGEST * start.parameters[0];
-        let mut real = model.clone();
-        real.effects.push(start.with("asymmetry", strong));
-        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
-        for (channel, values) in measured.channels() {
-            recording.set(channel, values.to_vec());
-        }
-        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
-        let layout = Layout::of(&model);
-        let free = layout.free(&model, &model);
-        let solution = solve_in_rounds(&objective, &model, &free, 1, &[]).unwrap();
-        let predictions = objective.predict(&model).unwrap();
-        let present = Present { solution: &solution, layout: &layout, predictions: &predictions };
-        let screened = screen(&objective, &present, &[Candidate { starts: vec![start] }], &Quiet);
-        let found = &screened[0];
+        record(&model, start.with("asymmetry", strong), &mut recording);
+        let (found, _) = screened(&model, recording, &[], vec![start]);
         assert!((found.start.parameters[0] / strong - 1.0).abs() < 0.3, "{:?}", found.start.parameters[0]);
         assert!(found.gain > 0.8, "{}", found.gain);
+    }
+
+    /// A spring whose torque the recalibration took for that of half as much weight again.
+    #[test]
+    fn a_parameter_makes_room_for_what_it_has_taken_the_place_of() {
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let start = ActiveEffect::with_defaults(find("joint_spring").unwrap());
+        record(&model, start.with("stiffness_nm_per_rad", 0.4).with("rest_rad", 0.05), &mut recording);
+        let starts = vec![start.with("rest_rad", 0.05)];
+        let (found, present) = screened(&model, recording, &[COARSE_STEP, FINE_STEP], starts);
+        let mass_kg = |model: &JointModel| model.parameters.load.unwrap().mass_kg;
+        let (believed, taken) = (mass_kg(&model), mass_kg(&present));
+        assert!(taken > 1.3 * believed, "{taken} kg taken for {believed} kg");
+        let room = mass_kg(&found.room.expect("room"));
+        assert!(
+            (room - believed).abs() < 0.5 * (taken - believed),
+            "{room} kg of {taken} kg for {believed} kg"
+        );
+        assert!(found.gain > 0.5, "{}", found.gain);
     }
 }
