@@ -216,13 +216,8 @@ fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
 fn what_the_written_rig_does_not_gain_by_is_not_found() {
     let plan = plans(1).into_iter().find(|plan| plan.name == "parameters/23").unwrap();
     let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
-    let search = &outcome.diagnosis.search[0];
-    let best = search.tried.iter().filter_map(|tried| tried.heldout_loss).fold(f64::INFINITY, f64::min);
-    assert!(
-        best < 0.8 * search.loss_before,
-        "{best} of {}: nothing was found to withdraw",
-        search.loss_before
-    );
+    // Only beside something that was found is more looked for.
+    assert!(outcome.diagnosis.search.len() > 1, "nothing was found that could be withdrawn");
     assert_eq!(outcome.diagnosis.verdict, Verdict::Recalibrate);
     assert_eq!(outcome.diagnosis.effects, []);
 }
