@@ -1,7 +1,7 @@
 //! The bench that unit tests share.
 
 use bowden_model::channel::Channel;
-use bowden_model::parameters::NOMINAL_PARAMETERS;
+use bowden_model::parameters::{NOMINAL_PARAMETERS, UNITS_OF_STRENGTH};
 
 use crate::joint_model::JointModel;
 use crate::recording::Recording;
@@ -26,8 +26,7 @@ pub(crate) fn swung(samples: u32) -> Recording {
 
 /// A joint that is `share` as strong and as heavy, at the same angles, duties and currents: every torque and force is that share.
 pub(crate) fn smaller(mut model: JointModel, share: f64) -> JointModel {
-    const SCALED: [&str; 8] = ["V", "Ω", "H", "N·m/A", "kg·m²", "N·m·s/rad", "N", "kg"];
-    for parameter in NOMINAL_PARAMETERS.iter().filter(|parameter| SCALED.contains(&parameter.spec.unit)) {
+    for parameter in NOMINAL_PARAMETERS.iter().filter(|p| UNITS_OF_STRENGTH.contains(&p.spec.unit)) {
         if let Some(value) = parameter.get(&model.parameters) {
             parameter.set(&mut model.parameters, share * value);
         }

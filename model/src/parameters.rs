@@ -203,6 +203,10 @@ pub static NOMINAL_PARAMETERS: [NominalParameter; 18] = [
     ),
 ];
 
+/// Units of what a stronger joint has in proportion, where angles, speeds, duties and currents are the same: forces, torques,
+/// masses, and the voltages that go with them.
+pub const UNITS_OF_STRENGTH: [&str; 8] = ["V", "Ω", "H", "N·m/A", "kg·m²", "N·m·s/rad", "N", "kg"];
+
 /// The nominal parameter at `section.name`.
 #[must_use]
 pub fn nominal(section: &str, name: &str) -> Option<&'static NominalParameter> {

@@ -13,7 +13,7 @@ use bowden::replay;
 use bowden::rig::{Rig, RigDocument};
 use bowden_model::channel::Channel;
 use bowden_model::effects::find;
-use bowden_model::parameters::NOMINAL_PARAMETERS;
+use bowden_model::parameters::{NOMINAL_PARAMETERS, UNITS_OF_STRENGTH};
 use bowden_tests::prove::plan::plans;
 use bowden_tests::prove::truth::TRAINING_S;
 use bowden_tests::{recording_of, rms_difference};
@@ -333,10 +333,9 @@ fn a_weaker_joint_is_diagnosed_as_the_strong_one_is() {
 
 /// The rig file with every force, torque, voltage and resistance times `share`.
 fn finger(rig_toml: &str, share: f64) -> String {
-    const UNITS: [&str; 8] = ["V", "Ω", "H", "N·m/A", "kg·m²", "N·m·s/rad", "N", "kg"];
     let scaled = |name: &str| {
         let nominal = NOMINAL_PARAMETERS.iter().find(|parameter| parameter.spec.name == name);
-        name.starts_with("tension_") || nominal.is_some_and(|parameter| UNITS.contains(&parameter.spec.unit))
+        name.starts_with("tension_") || nominal.is_some_and(|p| UNITS_OF_STRENGTH.contains(&p.spec.unit))
     };
     let line = |line: &str| match line.split_once(" = ") {
         Some((name, value)) if scaled(name) => {
