@@ -87,10 +87,10 @@ pub struct Recalibrated {
 
 /// Relative change from which on a parameter counts as wrong, where a data sheet or a balance tells it: motor and load. On
 /// virtual benches that are 3 % off their files and hide nothing, these come out up to 5 % off.
-const WRONG_ON_PAPER: f64 = 0.1;
+pub(super) const WRONG_ON_PAPER: f64 = 0.1;
 
 /// The same for what changes from one mounting to the next: friction, stiffness, pretension. Of such benches, up to 12 %.
-const WRONG_WHEN_MOUNTED: f64 = 0.15;
+pub(super) const WRONG_WHEN_MOUNTED: f64 = 0.15;
 
 impl Recalibrated {
     /// Relative change against the rig file.

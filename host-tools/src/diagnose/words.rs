@@ -5,7 +5,7 @@ use std::fmt::Write;
 use bowden_model::effect::{ActiveEffect, Component};
 
 use super::selection::{Chosen, Tried};
-use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
+use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict, WRONG_ON_PAPER, WRONG_WHEN_MOUNTED};
 
 /// Sharpness with which a ratio of held-out losses turns into odds: a candidate that leaves a fifth more is six times
 /// less likely.
@@ -142,8 +142,11 @@ pub(super) fn summary(
         .map(|p| format!("{} {:+.0} %", p.parameter, 100.0 * p.change()))
         .collect();
     let parameters = if changed.is_empty() {
-        "Motor and load are within 10 % of the rig file, friction, stiffness and pretension within 15 %."
-            .to_owned()
+        format!(
+            "Motor and load are within {:.0} % of the rig file, friction, stiffness and pretension within {:.0} %.",
+            100.0 * WRONG_ON_PAPER,
+            100.0 * WRONG_WHEN_MOUNTED
+        )
     } else {
         format!("Parameters that were off: {}.", changed.join(", "))
     };
