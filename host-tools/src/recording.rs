@@ -17,6 +17,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use bowden_model::channel::Channel;
 
@@ -39,8 +40,8 @@ pub enum Column {
     Known {
         /// The role.
         channel: Channel,
-        /// One value a sample.
-        values: Vec<f64>,
+        /// One value a sample; what is prepared for a replay shares them.
+        values: Arc<Vec<f64>>,
     },
     /// A column that is not interpreted.
     Unknown(TextColumn),
@@ -83,7 +84,7 @@ pub struct ReadOptions {
 #[derive(Clone, Debug)]
 pub struct Recording {
     source: String,
-    t_s: Vec<f64>,
+    t_s: Arc<Vec<f64>>,
     columns: Vec<Column>,
     places: Places,
     notes: Vec<String>,
@@ -102,7 +103,7 @@ impl Recording {
     pub fn new(source: impl Into<String>, t_s: Vec<f64>) -> Self {
         Self {
             source: source.into(),
-            t_s,
+            t_s: Arc::new(t_s),
             columns: Vec::new(),
             places: Places::samples(),
             notes: Vec::new(),
@@ -118,7 +119,7 @@ impl Recording {
         assert_eq!(values.len(), self.len(), "{}: one value a sample", channel.role());
         let same = |column: &Column| matches!(column, Column::Known { channel: c, .. } if *c == channel);
         self.columns.retain(|column| !same(column));
-        self.columns.push(Column::Known { channel, values });
+        self.columns.push(Column::Known { channel, values: Arc::new(values) });
     }
 
     /// The recording with a channel added; see [`Recording::set`].
@@ -138,10 +139,24 @@ impl Recording {
         &self.t_s
     }
 
+    /// Time as [`Recording::t_s`], to be kept beside the recording.
+    pub fn shared_t_s(&self) -> Arc<Vec<f64>> {
+        Arc::clone(&self.t_s)
+    }
+
     /// Values of a channel, if it was recorded.
     pub fn channel(&self, channel: Channel) -> Option<&[f64]> {
+        self.values(channel).map(|values| values.as_slice())
+    }
+
+    /// The same, to be kept beside the recording.
+    pub fn shared(&self, channel: Channel) -> Option<Arc<Vec<f64>>> {
+        self.values(channel).map(Arc::clone)
+    }
+
+    fn values(&self, channel: Channel) -> Option<&Arc<Vec<f64>>> {
         self.columns.iter().find_map(|column| match column {
-            Column::Known { channel: c, values } if *c == channel => Some(values.as_slice()),
+            Column::Known { channel: c, values } if *c == channel => Some(values),
             _ => None,
         })
     }
@@ -215,13 +230,13 @@ impl Recording {
     pub fn slice(&self, samples: Range<usize>) -> Self {
         let columns = self.columns.iter().map(|column| match column {
             Column::Known { channel, values } => {
-                Column::Known { channel: *channel, values: values[samples.clone()].to_vec() }
+                Column::Known { channel: *channel, values: Arc::new(values[samples.clone()].to_vec()) }
             }
             Column::Unknown(text) => Column::Unknown(text.slice(samples.clone())),
         });
         Self {
             source: self.source.clone(),
-            t_s: self.t_s[samples.clone()].to_vec(),
+            t_s: Arc::new(self.t_s[samples.clone()].to_vec()),
             columns: columns.collect(),
             places: self.places.after(samples.start),
             notes: self.notes.clone(),
@@ -343,7 +358,7 @@ impl Origin {
         }
         Ok(Recording {
             source: self.source,
-            t_s,
+            t_s: Arc::new(t_s),
             columns,
             places: self.places,
             notes: self.notes,

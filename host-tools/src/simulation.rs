@@ -9,6 +9,8 @@
 //! Compared with a prescribed low-passed angle this lets the input pulley give way to the load as the real one does;
 //! `cargo xtask bench` prints what that gains.
 
+use std::sync::Arc;
+
 use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::{ActiveEffect, SensorPort};
@@ -40,13 +42,15 @@ const GUIDE_FILTER_S: f64 = 0.03;
 /// Inputs of a replay, prepared once and used for every set of parameters.
 #[derive(Clone, Debug)]
 pub struct ReplayInput {
-    t_s: Vec<f64>,
+    t_s: Arc<Vec<f64>>,
+    /// Median distance of two samples, s.
+    step_s: f64,
     motion: Option<Motion>,
-    duty: Option<Vec<f64>>,
-    bus_v: Option<Vec<f64>>,
-    enabled: Option<Vec<f64>>,
-    theta_ref_rad: Option<Vec<f64>>,
-    torque_out_nm: Option<Vec<f64>>,
+    duty: Option<Arc<Vec<f64>>>,
+    bus_v: Option<Arc<Vec<f64>>>,
+    enabled: Option<Arc<Vec<f64>>>,
+    theta_ref_rad: Option<Arc<Vec<f64>>>,
+    torque_out_nm: Option<Arc<Vec<f64>>>,
     start_rad: Option<f64>,
     start_rad_s: f64,
     clock_offset_s: f64,
@@ -61,11 +65,13 @@ impl ReplayInput {
     /// # Errors
     /// When an input role is missing.
     pub fn new(model: &JointModel, recording: &Recording) -> Result<Self, Failure> {
-        let take = |channel: Channel| -> Result<Option<Vec<f64>>, Failure> {
+        let t_s = recording.shared_t_s();
+        let step_s = median_step_s(&t_s);
+        let take = |channel: Channel| -> Result<Option<Arc<Vec<f64>>>, Failure> {
             if !model.inputs.contains(&channel) {
                 return Ok(None);
             }
-            let values = recording.channel(channel).ok_or_else(|| {
+            let values = recording.shared(channel).ok_or_else(|| {
                 Failure::bad_input(format!(
                     "{}: no column for the input {}; map one in [recording.columns] or leave it out of replay.inputs",
                     recording.source(),
@@ -76,15 +82,17 @@ impl ReplayInput {
                 Some(first) if model.relative_inputs.contains(&channel) => *first,
                 _ => 0.0,
             };
-            let values: Vec<f64> = values.iter().map(|value| value - zero).collect();
+            let values = match zero {
+                0.0 => values,
+                zero => Arc::new(values.iter().map(|value| value - zero).collect()),
+            };
             Ok(Some(match model.smoothing_s.iter().find(|(smoothed, _)| *smoothed == channel) {
                 Some((_, time_s)) => {
-                    moving_average(&values, (0.5 * time_s / median_step_s(recording.t_s())) as usize)
+                    Arc::new(moving_average(values.to_vec(), (0.5 * time_s / step_s) as usize))
                 }
                 None => values,
             }))
         };
-        let t_s = recording.t_s().to_vec();
         let motion = take(Channel::ThetaIn)?.map(|theta| Motion::from_encoder(&t_s, &theta));
         let duty = take(Channel::Duty)?;
         let theta_ref_rad = take(Channel::ThetaRef)?;
@@ -102,6 +110,7 @@ impl ReplayInput {
             start_rad_s: 0.0,
             clock_offset_s: 0.0,
             cables_nm_per_rad: cables_nm_per_rad(model),
+            step_s,
             t_s,
         })
     }
@@ -117,9 +126,11 @@ impl ReplayInput {
     pub fn thinned(&self, every: usize) -> Self {
         let every = every.max(1);
         let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(every).copied().collect() };
-        let some = |values: &Option<Vec<f64>>| values.as_deref().map(thin);
+        let some = |values: &Option<Arc<Vec<f64>>>| values.as_ref().map(|values| Arc::new(thin(values)));
+        let t_s = thin(&self.t_s);
         Self {
-            t_s: thin(&self.t_s),
+            step_s: median_step_s(&t_s),
+            t_s: Arc::new(t_s),
             motion: self.motion.as_ref().map(|motion| Motion {
                 theta_rad: thin(&motion.theta_rad),
                 omega_rad_s: thin(&motion.omega_rad_s),
@@ -180,28 +191,31 @@ impl Prediction {
         self.channels.iter().find(|(c, _)| *c == channel).map(|(_, values)| values.as_slice())
     }
 
-    /// Cuts a channel at zero, as a sensor does that cannot read less.
-    pub fn cut_below_zero(&mut self, channel: Channel) {
-        for (_, values) in self.channels.iter_mut().filter(|(c, _)| *c == channel) {
-            for value in values {
-                *value = value.max(0.0);
-            }
-        }
-    }
-
-    /// The same joint seen with one more effect on its sensors, in the last place.
+    /// One channel of the same joint seen with one more effect on its sensor, in the last place; empty for what was not
+    /// predicted.
     ///
     /// # Errors
     /// When the set of one effect cannot be made.
-    pub fn seen_through(&self, effect: ActiveEffect, input: &ReplayInput) -> Result<Self, Failure> {
+    pub fn seen_through(
+        &self,
+        channel: Channel,
+        effect: ActiveEffect,
+        input: &ReplayInput,
+    ) -> Result<Vec<f64>, Failure> {
         let effects = EffectSet::from_slice(&[effect]).map_err(Failure::bad_input)?;
-        let mut seen = self.clone();
-        for (channel, values) in
-            seen.channels.iter_mut().filter(|(channel, _)| effect.target.includes(*channel))
-        {
-            *values = through(&input.t_s, values, |states, port| effects.measure(*channel, states, port));
-        }
-        Ok(seen)
+        let values = self.channel(channel).unwrap_or_default();
+        Ok(through(&input.t_s, values, |states, port| effects.measure(channel, states, port)))
+    }
+
+    /// Values of a channel, which is left empty; empty for what was not predicted.
+    pub fn take(&mut self, channel: Channel) -> Vec<f64> {
+        let found = self.channels.iter_mut().find(|(c, _)| *c == channel);
+        found.map(|(_, values)| std::mem::take(values)).unwrap_or_default()
+    }
+
+    /// All channels, to be changed.
+    pub fn channels_mut(&mut self) -> impl Iterator<Item = (Channel, &mut [f64])> {
+        self.channels.iter_mut().map(|(channel, values)| (*channel, values.as_mut_slice()))
     }
 
     /// All channels.
@@ -210,34 +224,75 @@ impl Prediction {
     }
 }
 
-/// Simulates the joint with the inputs of a recording.
+/// What takes the samples of a replay, so that nobody has to keep them who only compares.
+pub trait Sink {
+    /// The next sample: every output in the order in which they were asked for, and the torque that guided the motor, N·m at the input
+    /// pulley, where one did.
+    fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>);
+}
+
+/// Keeps everything.
+impl Sink for Prediction {
+    fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>) {
+        for ((_, values), value) in self.channels.iter_mut().zip(outputs) {
+            values.push(*value);
+        }
+        self.guide_nm.extend(guide_nm);
+    }
+}
+
+/// Simulates the joint with the inputs of a recording: all outputs of the model.
 ///
 /// # Errors
 /// When the model cannot be driven by these inputs.
 pub fn replay(model: &JointModel, input: &ReplayInput) -> Result<Prediction, Failure> {
+    replay_of(model, input, &model.outputs)
+}
+
+/// The same, of some of the outputs.
+///
+/// # Errors
+/// When the model cannot be driven by these inputs.
+pub fn replay_of(
+    model: &JointModel,
+    input: &ReplayInput,
+    outputs: &[Channel],
+) -> Result<Prediction, Failure> {
+    let samples = input.t_s.len();
+    let guided = if model.drive()? == Drive::GuidedMotor { samples } else { 0 };
+    let mut prediction = Prediction {
+        channels: outputs.iter().map(|channel| (*channel, Vec::with_capacity(samples))).collect(),
+        guide_nm: Vec::with_capacity(guided),
+    };
+    replay_into(model, input, outputs, &mut prediction)?;
+    Ok(prediction)
+}
+
+/// The same, sample by sample.
+///
+/// # Errors
+/// When the model cannot be driven by these inputs.
+pub fn replay_into(
+    model: &JointModel,
+    input: &ReplayInput,
+    outputs: &[Channel],
+    sink: &mut impl Sink,
+) -> Result<(), Failure> {
     let config = model.plant()?;
     let drive = model.drive()?;
-    let theta_in_rad = input.motion.as_ref().map(|motion| {
-        through(&input.t_s, &motion.theta_rad, |states, port| {
-            config.effects().correct(Channel::ThetaIn, states, port);
-        })
-    });
-    let run = Run { model, config: &config, input, theta_in_rad, drive };
-    if drive == Drive::GuidedMotor {
-        let no_torque = vec![0.0; input.t_s.len()];
-        let first = run.execute(
-            Guide { stiffness_nm_per_rad: STIFF_GUIDE * input.cables_nm_per_rad, ahead_nm: &no_torque },
-            &[],
-        );
-        let mut ahead_nm = first.guide_nm;
-        let half = (GUIDE_FILTER_S / median_step_s(&input.t_s)).round() as usize;
-        for _ in 0..2 {
-            ahead_nm = moving_average(&ahead_nm, half);
-        }
-        let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE * input.cables_nm_per_rad, ahead_nm: &ahead_nm };
-        return Ok(run.execute(guide, &model.outputs));
+    let run = Run { model, config: &config, input, drive };
+    if drive != Drive::GuidedMotor {
+        run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }, outputs, sink);
+        return Ok(());
     }
-    Ok(run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }, &model.outputs))
+    let stiffness_nm_per_rad = STIFF_GUIDE * input.cables_nm_per_rad;
+    let mut first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
+    run.execute(Guide { stiffness_nm_per_rad, ahead_nm: &[] }, &[], &mut first);
+    let half = (GUIDE_FILTER_S / input.step_s).round() as usize;
+    let ahead_nm = moving_average(moving_average(first.guide_nm, half), half);
+    let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE * input.cables_nm_per_rad, ahead_nm: &ahead_nm };
+    run.execute(guide, outputs, sink);
+    Ok(())
 }
 
 fn median_step_s(t_s: &[f64]) -> f64 {
@@ -252,6 +307,7 @@ fn median_step_s(t_s: &[f64]) -> f64 {
 #[derive(Clone, Copy)]
 struct Guide<'a> {
     stiffness_nm_per_rad: f64,
+    /// Torque at each sample that needs no angle to be left for it; none where it is empty.
     ahead_nm: &'a [f64],
 }
 
@@ -259,39 +315,46 @@ struct Run<'a> {
     model: &'a JointModel,
     config: &'a PlantConfig,
     input: &'a ReplayInput,
-    /// True angle of the input pulley, where it is prescribed.
-    theta_in_rad: Option<Vec<f64>>,
     drive: Drive,
 }
 
 impl Run<'_> {
     /// One pass; only `outputs` are sampled.
-    fn execute(&self, guide: Guide<'_>, outputs: &[Channel]) -> Prediction {
+    fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) {
         let input = self.input;
         let n = input.t_s.len();
         let longest_s = self.model.step_s.min(self.config.stable_step_s());
         let effects = self.config.effects();
-        let theta_in = self.theta_in_rad.as_ref();
-        let start_rad = theta_in.map(|t| t[0]).or(input.start_rad).unwrap_or(0.0);
+        let mut states = FRESH_STATES;
+        let mut theta_in_rad = |k: usize, dt_s: f64| {
+            let motion = input.motion.as_ref()?;
+            let mut port = SensorPort { t_s: input.t_s[k], dt_s, value: motion.theta_rad[k] };
+            effects.correct(Channel::ThetaIn, &mut states, &mut port);
+            Some(port.value)
+        };
+        let mut wanted_rad = theta_in_rad(0, 0.0);
+        let start_rad = wanted_rad.or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
         plant.set_time_s(input.clock_offset_s + input.t_s.first().copied().unwrap_or(0.0));
         if self.drive == Drive::Duty || self.drive == Drive::Servo {
             plant.set_speed_rad_s(input.start_rad_s);
         }
         plant.settle(self.config, &self.step_input(0, start_rad));
-        let mut sampler = Sampler::new(outputs, effects, n);
+        let mut sampler = Sampler::new(outputs, effects);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
-        let mut guide_nm = Vec::with_capacity(if self.drive == Drive::GuidedMotor { n } else { 0 });
         let mut duty = 0.0;
         for k in 0..n {
             let mut torque_sum = 0.0;
+            let span_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
             if k > 0 {
-                let span_s = input.t_s[k] - input.t_s[k - 1];
+                let from_rad = wanted_rad;
+                wanted_rad = theta_in_rad(k, span_s);
                 let steps = (span_s / longest_s - 1e-9).ceil().max(1.0);
                 let dt_s = span_s / steps;
                 for sub in 1..=steps as usize {
                     let share = sub as f64 / steps;
-                    let wanted = theta_in.map_or(0.0, |t| t[k - 1] + (t[k] - t[k - 1]) * share);
+                    let wanted =
+                        from_rad.zip(wanted_rad).map_or(0.0, |(from, to)| from + (to - from) * share);
                     let mut step = self.step_input(k - 1, wanted);
                     match self.drive {
                         Drive::GuidedMotor => {
@@ -310,8 +373,8 @@ impl Run<'_> {
                             }
                             // The rotor inside a play is not measured; what the pulley does there says nothing of it.
                             if !plant.inside_gear_play() {
-                                step.input_torque_nm =
-                                    guide.ahead_nm[k] - guide.stiffness_nm_per_rad * beyond;
+                                let ahead_nm = guide.ahead_nm.get(k).copied().unwrap_or(0.0);
+                                step.input_torque_nm = ahead_nm - guide.stiffness_nm_per_rad * beyond;
                             }
                             torque_sum += step.input_torque_nm / steps;
                         }
@@ -328,13 +391,9 @@ impl Run<'_> {
                     plant.step(self.config, &step, dt_s);
                 }
             }
-            if self.drive == Drive::GuidedMotor {
-                guide_nm.push(torque_sum);
-            }
-            let since_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
-            sampler.sample(self.config, &plant, duty, (input.t_s[k], since_s));
+            let outputs = sampler.sample(self.config, &plant, duty, (input.t_s[k], span_s));
+            sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
         }
-        Prediction { channels: sampler.channels, guide_nm }
     }
 
     fn ratio(&self) -> f64 {
@@ -343,7 +402,7 @@ impl Run<'_> {
 
     fn step_input(&self, k: usize, theta_in_rad: f64) -> StepInput {
         let input = self.input;
-        let at = |values: &Option<Vec<f64>>, otherwise: f64| values.as_ref().map_or(otherwise, |v| v[k]);
+        let at = |values: &Option<Arc<Vec<f64>>>, otherwise: f64| values.as_ref().map_or(otherwise, |v| v[k]);
         StepInput {
             bridge: BridgeInput {
                 duty: at(&input.duty, 0.0),
@@ -392,25 +451,26 @@ impl DelayLine {
 /// What the sensors would have shown had they no noise and no steps.
 struct Sampler<'a> {
     effects: &'a EffectSet,
-    channels: Vec<(Channel, Vec<f64>)>,
+    outputs: &'a [Channel],
     states: Vec<EffectStates>,
+    values: Vec<f64>,
 }
 
 impl<'a> Sampler<'a> {
-    fn new(outputs: &[Channel], effects: &'a EffectSet, samples: usize) -> Self {
-        let channels: Vec<_> = outputs.iter().map(|c| (*c, Vec::with_capacity(samples))).collect();
-        let states = vec![FRESH_STATES; channels.len()];
-        Self { effects, channels, states }
+    fn new(outputs: &'a [Channel], effects: &'a EffectSet) -> Self {
+        let states = vec![FRESH_STATES; outputs.len()];
+        Self { effects, outputs, states, values: vec![0.0; outputs.len()] }
     }
 
-    fn sample(&mut self, config: &PlantConfig, plant: &Plant, duty: f64, (t_s, dt_s): (f64, f64)) {
-        for ((channel, values), states) in self.channels.iter_mut().zip(&mut self.states) {
+    fn sample(&mut self, config: &PlantConfig, plant: &Plant, duty: f64, (t_s, dt_s): (f64, f64)) -> &[f64] {
+        for ((channel, value), states) in self.outputs.iter().zip(&mut self.values).zip(&mut self.states) {
             let outside = if *channel == Channel::Duty { duty } else { 0.0 };
-            let value = plant.channel(config, *channel).unwrap_or(outside);
-            let mut port = SensorPort { t_s, dt_s, value };
+            let mut port =
+                SensorPort { t_s, dt_s, value: plant.channel(config, *channel).unwrap_or(outside) };
             self.effects.measure(*channel, states, &mut port);
-            values.push(port.value);
+            *value = port.value;
         }
+        &self.values
     }
 }
 
@@ -462,7 +522,10 @@ mod tests {
             let with = JointModel { effects: vec![active], ..model.clone() };
             let simulated = replay(&with, &input).unwrap();
             assert_ne!(simulated, plain, "{} does nothing", active.descriptor().id);
-            assert_eq!(plain.seen_through(active, &input).unwrap(), simulated, "{}", active.descriptor().id);
+            for (channel, values) in simulated.channels() {
+                let seen = plain.seen_through(channel, active, &input).unwrap();
+                assert_eq!(seen, values, "{} on {}", active.descriptor().id, channel.role());
+            }
             tried += 1;
         }
         assert_eq!(tried, 5);

@@ -2,8 +2,9 @@
 //!
 //! A [`plan`] says which rigs; [`run`] draws one, writes its files and lets the binary work on them; the [`outcome`] is
 //! kept as a line of JSON; [`score`] and [`summary`] judge it against the [`truth`], and [`page`] prints that.
-//! [`rivals`] are other tools on the same files.
+//! [`rivals`] are other tools on the same files; [`lengths`] is what longer recordings cost.
 
+pub mod lengths;
 pub mod outcome;
 pub mod page;
 pub mod plan;

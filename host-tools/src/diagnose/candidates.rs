@@ -7,6 +7,7 @@ use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Component, Descriptor, ParameterSpec, Target};
 use bowden_model::effects::CATALOGUE;
 
+use super::locked::{cogging_start, ripple_start};
 use crate::fit::objective::{Objective, Series};
 use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
@@ -15,13 +16,7 @@ use crate::simulation::Prediction;
 /// Moments at which an effect with an onset is tried, spread over the recording.
 const ONSETS: usize = 12;
 
-/// Periods per turn at which a torque locked to an angle is looked for.
-const LOCKED_PERIODS: std::ops::RangeInclusive<usize> = 2..=240;
-
-/// Of so many samples one is looked at for it.
-const LOCKED_STRIDE: usize = 5;
-
-/// Strengths, in typical ones, at which an effect is tried that does not go with its strength.
+/// Strengths, in typical ones, at which an effect is tried, and speeds at which friction falls.
 const STEADY: [f64; 3] = [0.4, 1.0, 2.5];
 
 /// Relative rises of a winding's resistance at which its heating is tried.
@@ -131,9 +126,8 @@ fn starts(
         "joint_spring" => [-REST_RAD, 0.0, REST_RAD]
             .into_iter()
             .flat_map(|rest_rad| {
-                STEADY.map(|factor| {
-                    base.with("rest_rad", rest_rad).with("stiffness_nm_per_rad", factor * base.parameters[0])
-                })
+                STEADY
+                    .map(|factor| with_strength(base.with("rest_rad", rest_rad), from_neutral(base, factor)))
             })
             .collect(),
         // The other two quarters are these with the other sign.
@@ -172,7 +166,7 @@ fn onset_starts(base: ActiveEffect, onset: &ParameterSpec, duration_s: f64) -> V
 /// The given strengths; where friction falls with speed, the speed matters as much as the strength.
 fn steady_starts(base: ActiveEffect, strengths: &[f64]) -> Vec<ActiveEffect> {
     let speed = base.descriptor().parameters.iter().find(|spec| spec.name.starts_with("speed_"));
-    let factors: &[f64] = if speed.is_some() { &[0.4, 1.0, 2.5] } else { &[1.0] };
+    let factors: &[f64] = if speed.is_some() { &STEADY } else { &[1.0] };
     strengths
         .iter()
         .flat_map(|value| {
@@ -193,98 +187,6 @@ fn with_strength(mut effect: ActiveEffect, value: f64) -> ActiveEffect {
 fn from_neutral(base: ActiveEffect, factor: f64) -> f64 {
     let neutral = base.descriptor().neutral.unwrap_or(0.0);
     neutral + factor * (base.parameters[0] - neutral)
-}
-
-/// Amplitude, period and phase of a torque locked to an angle, by least squares over every whole period.
-///
-/// `samples` gives, for one recording, angle and torque sample by sample.
-fn locked_start(
-    base: ActiveEffect,
-    predictions: &[Prediction],
-    samples: impl Fn(usize, &Prediction) -> Option<Vec<(f64, f64)>>,
-) -> Option<ActiveEffect> {
-    let samples: Option<Vec<_>> = predictions
-        .iter()
-        .enumerate()
-        .map(|(recording, prediction)| samples(recording, prediction))
-        .collect();
-    let samples: Vec<(f64, f64)> = samples?.into_iter().flatten().collect();
-    let mut best: Option<(f64, ActiveEffect)> = None;
-    for periods in LOCKED_PERIODS {
-        let n = periods as f64;
-        let (mut ss, mut cc, mut sc, mut st, mut ct) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (angle_rad, torque_nm) in &samples {
-            let (sin, cos) = (n * angle_rad).sin_cos();
-            ss += sin * sin;
-            cc += cos * cos;
-            sc += sin * cos;
-            st += sin * torque_nm;
-            ct += cos * torque_nm;
-        }
-        let determinant = ss * cc - sc * sc;
-        if determinant <= 1e-9 * ss * cc {
-            continue;
-        }
-        let (a, b) = ((st * cc - ct * sc) / determinant, (ct * ss - st * sc) / determinant);
-        let gain = a * st + b * ct;
-        if best.as_ref().is_none_or(|(most, _)| gain > *most) {
-            let start = base
-                .with("amplitude_nm", a.hypot(b))
-                .with("cycles_per_turn", n)
-                .with("phase_rad", b.atan2(a));
-            best = Some((gain, start));
-        }
-    }
-    best.map(|(_, start)| start)
-}
-
-/// What the motor's model lacks is the torque that guided it, or that a spindle without motor took beyond what was
-/// predicted.
-fn cogging_start(
-    base: ActiveEffect,
-    objective: &Objective,
-    predictions: &[Prediction],
-) -> Option<ActiveEffect> {
-    locked_start(base, predictions, |recording, prediction| {
-        let motion = objective.input(recording).motion()?;
-        let lacking = lacking_nm(objective, recording, prediction)?;
-        let lacking = lacking.into_iter().enumerate().step_by(LOCKED_STRIDE);
-        // A motor that stands tells nothing about the position lock.
-        let moving = lacking.filter(|(k, _)| motion.omega_rad_s[*k].abs() >= 0.02);
-        Some(moving.map(|(k, torque_nm)| (motion.theta_rad[k], torque_nm)).collect())
-    })
-}
-
-/// Torque that helps the input round beyond what the model gives it.
-fn lacking_nm(objective: &Objective, recording: usize, prediction: &Prediction) -> Option<Vec<f64>> {
-    if !prediction.guide_nm.is_empty() {
-        return Some(prediction.guide_nm.clone());
-    }
-    let measured = objective.measured(recording, Series::Channel(Channel::TorqueIn))?;
-    let predicted = prediction.channel(Channel::TorqueIn)?;
-    let less = || predicted.iter().zip(measured).map(|(predicted, measured)| predicted - measured);
-    let mean = less().sum::<f64>() / measured.len().max(1) as f64;
-    Some(less().map(|torque_nm| torque_nm - mean).collect())
-}
-
-/// What the joint's model lacks is what the cables carried less than predicted.
-fn ripple_start(
-    base: ActiveEffect,
-    model: &JointModel,
-    objective: &Objective,
-    predictions: &[Prediction],
-) -> Option<ActiveEffect> {
-    let radius_m = model.parameters.pulleys?.output_radius_m;
-    locked_start(base, predictions, |recording, prediction| {
-        let of = |channel| {
-            let measured = objective.measured(recording, Series::Channel(channel))?;
-            Some((measured, prediction.channel(channel)?))
-        };
-        let ((a, a_predicted), (b, b_predicted)) = (of(Channel::F2)?, of(Channel::F4)?);
-        let theta = objective.measured(recording, Series::Channel(Channel::ThetaOut))?;
-        let less = |k: usize| radius_m * ((a_predicted[k] - b_predicted[k]) - (a[k] - b[k]));
-        Some((0..theta.len()).step_by(LOCKED_STRIDE).map(|k| (theta[k], less(k))).collect())
-    })
 }
 
 /// Gains with which the power of the recordings, kept up, would raise the resistance by [`RISES`]: what a watt does to a winding

@@ -1,13 +1,15 @@
 //! Where simulation and recording differ: channel, component, regime, time.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::Component;
 
-use super::Stages;
+use super::stages::Stages;
 use super::verdict::{Mismatch, RegimeResidual};
 use crate::fit::objective::{Block, Entry, Objective, Residuals, Series, loss};
+use crate::reconstruct::Motion;
 
 /// Speed below which the input counts as held, rad/s.
 const HOLD_RAD_S: f64 = 0.02;
@@ -69,17 +71,17 @@ pub(crate) const fn unit_of(series: Series) -> &'static str {
 }
 
 /// Speed of the input at every sample of a recording.
-pub(crate) fn speed(objective: &Objective, recording: usize) -> Vec<f64> {
+pub(crate) fn speed(objective: &Objective, recording: usize) -> Cow<'_, [f64]> {
     let input = objective.input(recording);
     if let Some(motion) = input.motion() {
-        return motion.omega_rad_s.clone();
+        return Cow::Borrowed(&motion.omega_rad_s);
     }
     let measured = [Channel::ThetaIn, Channel::ThetaOut, Channel::ThetaMotor]
         .into_iter()
         .find_map(|channel| objective.measured(recording, Series::Channel(channel)));
     match measured {
-        Some(theta) => crate::reconstruct::Motion::from_encoder(input.t_s(), theta).omega_rad_s,
-        None => vec![0.0; input.t_s().len()],
+        Some(theta) => Motion::from_encoder(input.t_s(), theta).omega_rad_s.into(),
+        None => vec![0.0; input.t_s().len()].into(),
     }
 }
 
@@ -159,12 +161,10 @@ pub(crate) fn mismatch(objective: &Objective, residuals: &Residuals) -> Vec<Mism
 
 /// Root mean square differences by channel and regime, over all recordings.
 pub(crate) fn regimes(objective: &Objective, stages: &Stages) -> Vec<RegimeResidual> {
-    let by_stage = [&stages.before, &stages.recalibrated, &stages.after].map(|predictions| {
-        let residuals = objective.compare(predictions);
+    let regimes: Vec<Vec<Regime>> = (0..objective.recordings()).map(|r| regimes_of(objective, r)).collect();
+    let by_stage = [&stages.before, &stages.recalibrated, &stages.after].map(|stage| {
         let mut sums: BTreeMap<(Series, Regime), (f64, f64)> = BTreeMap::new();
-        let regimes: Vec<Vec<Regime>> =
-            (0..objective.recordings()).map(|r| regimes_of(objective, r)).collect();
-        for (entry, value) in objective.entries().zip(&residuals.values) {
+        for (entry, value) in objective.entries().zip(&stage.residuals.values) {
             let regime = regimes[entry.recording][usize::midpoint(entry.block.start, entry.block.end)];
             let sum = sums.entry((entry.series, regime)).or_insert((0.0, 0.0));
             sum.0 += (value * objective.scale(entry.series)).powi(2);

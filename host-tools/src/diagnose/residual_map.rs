@@ -1,9 +1,11 @@
 //! Where in position, speed, tension and time simulation and recording differ: a map of every channel.
 
+use std::borrow::Cow;
+
 use bowden_model::channel::Channel;
 
-use super::Stages;
 use super::place::{speed, unit_of};
+use super::stages::Stages;
 use super::verdict::{MapAxis, MapChannel, ResidualMap};
 use crate::fit::objective::{Aspect, Entry, Objective, Residuals, Series};
 
@@ -18,8 +20,6 @@ const DIGITS: usize = 3;
 
 /// Map of the differences before and after.
 pub(crate) fn residual_map(objective: &Objective, stages: &Stages) -> ResidualMap {
-    let before = objective.compare(&stages.before);
-    let after = objective.compare(&stages.after);
     let variables = variables(objective);
     let mut map = ResidualMap::default();
     let mut places: Vec<Vec<usize>> = Vec::new();
@@ -39,47 +39,71 @@ pub(crate) fn residual_map(objective: &Objective, stages: &Stages) -> ResidualMa
         map.channels.push(MapChannel {
             channel: series.name().to_owned(),
             unit: unit_of(*series).to_owned(),
-            before_rmse: by_bin(&before),
-            after_rmse: by_bin(&after),
+            before_rmse: by_bin(&stages.before.residuals),
+            after_rmse: by_bin(&stages.after.residuals),
         });
     }
     map
 }
 
-/// Name, unit and the value at every entry of the objective; a variable that some recording lacks is left out.
-fn variables(objective: &Objective) -> Vec<(&'static str, &'static str, Vec<f64>)> {
-    let mut clock_s = 0.0;
-    let recordings: Vec<[Vec<f64>; 4]> = (0..objective.recordings())
-        .map(|recording| {
+/// What one recording says of where it was; empty what it lacks.
+struct Where<'a> {
+    position: &'a [f64],
+    speed: Cow<'a, [f64]>,
+    tensions: Vec<&'a [f64]>,
+    t_s: &'a [f64],
+    /// Time of the recordings before it, s.
+    clock_s: f64,
+}
+
+impl<'a> Where<'a> {
+    fn of_all(objective: &'a Objective) -> Vec<Self> {
+        let mut clock_s = 0.0;
+        let of = |recording| {
             let input = objective.input(recording);
             let t_s = input.t_s();
-            let measured =
-                |channel| objective.measured(recording, Series::Channel(channel)).map(<[f64]>::to_vec);
+            let measured = |channel| objective.measured(recording, Series::Channel(channel));
             let position = input
                 .motion()
-                .map(|motion| motion.theta_rad.clone())
+                .map(|motion| motion.theta_rad.as_slice())
                 .or_else(|| measured(Channel::ThetaIn))
                 .or_else(|| measured(Channel::ThetaOut))
                 .unwrap_or_default();
-            let tensions: Vec<Vec<f64>> = Channel::TENSIONS.into_iter().filter_map(measured).collect();
-            let largest =
-                |k: usize| tensions.iter().map(|tension| tension[k]).fold(f64::NEG_INFINITY, f64::max);
-            let tension =
-                if tensions.is_empty() { Vec::new() } else { (0..t_s.len()).map(largest).collect() };
-            let times: Vec<f64> = t_s.iter().map(|t_s_k| clock_s + t_s_k - t_s[0]).collect();
-            clock_s = times.last().copied().unwrap_or(clock_s);
-            [position, speed(objective, recording), tension, times]
-        })
-        .collect();
-    [("theta_rad", "rad"), ("omega_rad_s", "rad/s"), ("tension_n", "N"), ("t_s", "s")]
+            let tensions = Channel::TENSIONS.into_iter().filter_map(measured).collect();
+            let place = Self { position, speed: speed(objective, recording), tensions, t_s, clock_s };
+            clock_s = place.time_s(t_s.len().saturating_sub(1)).unwrap_or(clock_s);
+            place
+        };
+        (0..objective.recordings()).map(of).collect()
+    }
+
+    fn largest_tension(&self, sample: usize) -> Option<f64> {
+        self.tensions.iter().map(|tension| tension[sample]).reduce(f64::max)
+    }
+
+    fn time_s(&self, sample: usize) -> Option<f64> {
+        Some(self.clock_s + self.t_s.get(sample)? - self.t_s.first()?)
+    }
+}
+
+/// Name, unit and the value at every entry of the objective; a variable that some recording lacks is left out.
+fn variables(objective: &Objective) -> Vec<(&'static str, &'static str, Vec<f64>)> {
+    type Value = fn(&Where<'_>, usize) -> Option<f64>;
+    let recordings = Where::of_all(objective);
+    let variables: [(&str, &str, Value); 4] = [
+        ("theta_rad", "rad", |place, sample| place.position.get(sample).copied()),
+        ("omega_rad_s", "rad/s", |place, sample| place.speed.get(sample).copied()),
+        ("tension_n", "N", |place, sample| place.largest_tension(sample)),
+        ("t_s", "s", |place, sample| place.time_s(sample)),
+    ];
+    let at = |entry: Entry, value: Value| {
+        value(&recordings[entry.recording], usize::midpoint(entry.block.start, entry.block.end))
+    };
+    variables
         .into_iter()
-        .enumerate()
-        .filter(|(index, _)| recordings.iter().all(|columns| !columns[*index].is_empty()))
-        .map(|(index, (name, unit))| {
-            let at = |entry: Entry| {
-                recordings[entry.recording][index][usize::midpoint(entry.block.start, entry.block.end)]
-            };
-            (name, unit, objective.entries().map(at).collect())
+        .filter_map(|(name, unit, value)| {
+            let values: Option<Vec<f64>> = objective.entries().map(|entry| at(entry, value)).collect();
+            Some((name, unit, values?))
         })
         .collect()
 }
@@ -122,10 +146,11 @@ fn rounded(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::stages::Stage;
     use crate::joint_model::JointModel;
     use crate::recording::Recording;
     use crate::rig::Rig;
-    use crate::simulation::Prediction;
+    use crate::simulation::{ReplayInput, replay};
 
     /// Recorded tensions are what the simulation says, plus 2 N in the last quarter of the recording alone: the map of time
     /// must show it there, and as high as it is.
@@ -140,23 +165,17 @@ mod tests {
         let t_s: Vec<f64> = (0..8000).map(|k| 0.001 * f64::from(k)).collect();
         let theta_rad: Vec<f64> = t_s.iter().map(|t_s| 0.5 * (0.9 * t_s).sin()).collect();
         let plain = Recording::new("plain", t_s.clone()).with(Channel::ThetaIn, theta_rad.clone());
-        let unmeasured = plain.clone().with(Channel::F1, vec![0.0; 8000]).with(Channel::F2, vec![0.0; 8000]);
-        let model = JointModel::from_rig(&rig, &unmeasured).unwrap();
-        let simulated = Objective::new(&model, &[unmeasured], &[], true).unwrap().predict(&model).unwrap();
-        let f1_n = simulated[0].channel(Channel::F1).unwrap();
+        let model = JointModel::from_rig(&rig, &plain).unwrap();
+        let simulated = replay(&model, &ReplayInput::new(&model, &plain).unwrap()).unwrap();
+        let f1_n = simulated.channel(Channel::F1).unwrap();
         let off_n = |k: usize| if k >= 6000 { 2.0 } else { 0.0 };
         let recorded: Vec<f64> = f1_n.iter().enumerate().map(|(k, f1_n)| f1_n + off_n(k)).collect();
         let recording = plain
             .with(Channel::F1, recorded)
-            .with(Channel::F2, simulated[0].channel(Channel::F2).unwrap().to_vec());
+            .with(Channel::F2, simulated.channel(Channel::F2).unwrap().to_vec());
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
-        let same = |predictions: &[Prediction]| predictions.to_vec();
-        let stages = Stages {
-            before: same(&simulated),
-            recalibrated: same(&simulated),
-            after: same(&simulated),
-            searched: same(&simulated),
-        };
+        let stage = || Stage::of(&objective, &model).unwrap();
+        let stages = Stages { before: stage(), recalibrated: stage(), after: stage() };
         let map = residual_map(&objective, &stages);
         let names: Vec<&str> = map.axes.iter().map(|axis| axis.variable.as_str()).collect();
         assert_eq!(names, ["theta_rad", "omega_rad_s", "tension_n", "t_s"]);

@@ -5,9 +5,9 @@
 //! after a refit is estimated as `min_b |P (r + b (r_c - r))|²` with the projection `P = 1 - J (JᵀJ)⁻¹ Jᵀ`: exact for an
 //! effect that enters linearly, a ranking for the others; those that it ranks first are simulated at their estimated strength.
 //!
-//! Where a parameter has taken the place of what is missing, as a weight that of a spring, the effect changes much and nearly
-//! all of it is what parameters change too; the little by which the two differ is lost in the curvature of so long a way.
-//! Such a start is simulated once more with the parameters where the slopes would put them.
+//! Where a parameter has taken the place of what is missing, as a weight that of a spring, most of what the effect changes is
+//! what parameters change too; the little by which the two differ is lost in the curvature of so long a way. Such a start is
+//! simulated again with the parameters where the slopes would put them, and once more from there if that was better.
 
 use bowden_model::effect::{ActiveEffect, Component};
 use nalgebra::{DMatrix, DVector};
@@ -37,7 +37,7 @@ const IN_PLACE_OF: f64 = 0.5;
 /// Farthest that a parameter makes room, in the optimiser's coordinate: a factor of two.
 const ROOM: f64 = 0.7;
 
-/// Times that they are asked to; their slopes are those of the present model.
+/// Times that they are asked to; the slopes are those of the present model.
 const ROOM_ROUNDS: usize = 2;
 
 /// A candidate after screening.

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::candidates::candidates;
 use super::layout::{Layout, largest_ordinary};
+use super::locked::too_little_travel;
 use super::screening::{Present, Screened, screen};
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_for_ranking, solve_in_rounds};
@@ -327,10 +328,10 @@ impl Search<'_> {
     /// fitted to the end. Returns all candidates for the record, and the fits, best first.
     fn one_more(&self, present: &Fitted) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
         let Self { objective, progress, .. } = *self;
-        let predictions = objective.predict(&present.solution.model)?;
-        let all = candidates(&present.without_ordinary(), objective, &predictions, self.asked);
-        progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
         let ranked = {
+            let predictions = objective.predict(&present.solution.model)?;
+            let all = candidates(&present.without_ordinary(), objective, &predictions, self.asked);
+            progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
             let Fitted { layout, solution, .. } = present;
             let present = Present { believed: self.believed, solution, layout, predictions: &predictions };
             screen(objective, &present, &all, progress)
@@ -353,7 +354,7 @@ impl Search<'_> {
         let mut fits: Vec<(usize, Fitted)> =
             fits?.into_iter().enumerate().filter_map(|(place, fitted)| Some((place, fitted?))).collect();
         let best_first = |fits: &mut Vec<(usize, Fitted)>| {
-            fits.retain(|(_, fitted)| !negligible(self.believed, &fitted.newest()));
+            fits.retain(|(_, fitted)| !negligible(objective, self.believed, &fitted.newest()));
             fits.sort_by(|(_, a), (_, b)| a.best_first(b));
         };
         let mut keep = |place: usize, fitted: &Fitted| {
@@ -445,13 +446,16 @@ pub fn worthwhile(before: f64, after: f64) -> bool {
     before - after > WORTHWHILE_LOSS && before - after > WORTHWHILE_SHARE * before
 }
 
-/// Whether an effect was fitted so weak that it is hardly there, or no more than every bench has.
-fn negligible(believed: &JointModel, effect: &ActiveEffect) -> bool {
+/// Whether an effect was fitted so weak that it is hardly there, or no more than every bench has, or shows too little of itself
+/// to be told.
+fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffect) -> bool {
     let descriptor = effect.descriptor();
     let Some(strength) = descriptor.parameters.first() else { return false };
     let usual = typical(believed, descriptor.component, strength);
     let value = effect.parameters[0];
-    if largest_ordinary(believed, descriptor.id).is_some_and(|largest| value <= largest) {
+    if largest_ordinary(believed, descriptor.id).is_some_and(|largest| value <= largest)
+        || too_little_travel(objective, effect)
+    {
         return true;
     }
     let hardly_there = || {
@@ -474,8 +478,8 @@ mod tests {
     use bowden_model::effects::find;
     use nalgebra::DMatrix;
 
-    use super::{Losses, Selected};
-    use crate::fit::objective::Residuals;
+    use super::{Losses, Selected, largest_ordinary, negligible};
+    use crate::fit::objective::{Objective, Residuals};
     use crate::fit::solver::Solution;
     use crate::joint_model::JointModel;
     use crate::test_bench;
@@ -506,6 +510,52 @@ mod tests {
         let withdrawn = selected.withdrawn();
         assert_eq!(withdrawn.ordinary, [before]);
         assert_eq!((withdrawn.model, withdrawn.searched), (bench.clone(), with(&[before])));
+    }
+
+    /// The largest of the benches that hide nothing, the smallest of those whose sheaths stick; much friction that falls at
+    /// a crawl and a trace of it that falls late are neither.
+    #[test]
+    fn friction_that_falls_at_a_crawl_is_how_contacts_give_way() {
+        let recording = test_bench::swung(2000);
+        let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+        for (static_ratio, speed_m_s, left_out) in [
+            (1.563, 0.000_16, true),
+            (1.053, 0.001_42, true),
+            (1.656, 0.001_18, false),
+            (1.543, 0.005_15, false),
+            (1.05, 0.02, true),
+        ] {
+            let effect = ActiveEffect::with_defaults(find("sheath_stribeck_friction").unwrap())
+                .with("static_ratio", static_ratio)
+                .with("speed_m_s", speed_m_s);
+            assert_eq!(
+                negligible(&objective, &bench, &effect),
+                left_out,
+                "{static_ratio} at {speed_m_s} m/s"
+            );
+        }
+    }
+
+    #[test]
+    fn what_every_bench_has_and_what_the_travel_does_not_show_has_no_name() {
+        let recording = test_bench::swung(2000);
+        let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+        let friction = |share: f64| {
+            let largest_nm = largest_ordinary(&bench, "motor_coulomb_friction").unwrap();
+            ActiveEffect::with_defaults(find("motor_coulomb_friction").unwrap())
+                .with("torque_nm", share * largest_nm)
+        };
+        let cogging = |cycles_per_turn| {
+            ActiveEffect::with_defaults(find("motor_cogging").unwrap())
+                .with("cycles_per_turn", cycles_per_turn)
+        };
+        for (effect, left_out) in
+            [(friction(0.99), true), (friction(1.5), false), (cogging(11.0), true), (cogging(13.0), false)]
+        {
+            assert_eq!(negligible(&objective, &bench, &effect), left_out, "{:?}", effect.parameters);
+        }
     }
 
     #[test]

@@ -14,8 +14,9 @@ use std::f64::consts::TAU;
 
 use super::verdict::{FreeForm, Unexplained};
 use super::words::short;
-use crate::fit::objective::{Aspect, Objective, Part, Series, loss};
-use crate::simulation::Prediction;
+use crate::fit::objective::{Aspect, Objective, Part, Residuals, Series, loss};
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
 use locate::Answer;
 use samples::{Left, Samples, Variable};
 use shape::{Factor, Fitted, Shape};
@@ -24,22 +25,30 @@ use shape::{Factor, Fitted, Shape};
 /// where the loss itself begins to bend. None of fifty virtual benches without concealed effects reaches it.
 const LEFT_OVER: f64 = 9.0;
 
-/// The strongest structure in what `predictions` leave, if there is more than an ordinary bench leaves.
-pub(crate) fn unexplained(objective: &Objective, predictions: &[Prediction]) -> Option<Unexplained> {
-    let samples = Samples::new(objective, predictions);
-    if let Some(found) = structure::strongest(&samples) {
+/// The strongest structure in what `model` leaves, if there is more than an ordinary bench leaves.
+///
+/// # Errors
+/// When the model cannot be driven.
+pub(crate) fn unexplained(objective: &Objective, model: &JointModel) -> Result<Option<Unexplained>, Failure> {
+    let (samples, residuals) = {
+        let predictions = objective.predict(model)?;
+        (Samples::new(objective, &predictions), objective.compare(&predictions))
+    };
+    Ok(found(objective, &samples, &residuals))
+}
+
+fn found(objective: &Objective, samples: &Samples, residuals: &Residuals) -> Option<Unexplained> {
+    if let Some(found) = structure::strongest(samples) {
         let left = samples.of(found.series)?;
-        return Some(described(&samples, left, &[(found.shape, found.fitted)]));
+        return Some(described(samples, left, &[(found.shape, found.fitted)]));
     }
-    let series = loudest(objective, predictions)?;
-    let left = samples.of(series)?;
-    Some(described(&samples, left, &structure::dependence(&samples, left)))
+    let left = samples.of(loudest(objective, residuals)?)?;
+    Some(described(samples, left, &structure::dependence(samples, left)))
 }
 
 /// The series with the largest held-out loss, if it is more than [`LEFT_OVER`].
-fn loudest(objective: &Objective, predictions: &[Prediction]) -> Option<Series> {
+fn loudest(objective: &Objective, residuals: &Residuals) -> Option<Series> {
     let mut by_series: BTreeMap<Series, (f64, f64)> = BTreeMap::new();
-    let residuals = objective.compare(predictions);
     for (entry, value) in objective.entries().zip(&residuals.values) {
         if entry.block.part == Part::HeldOut && entry.aspect == Aspect::Mean {
             let sum = by_series.entry(entry.series).or_insert((0.0, 0.0));

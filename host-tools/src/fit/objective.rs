@@ -13,6 +13,9 @@
 //! Tendons of the nominal model may push, amplifiers read from zero: where a recording lies on that zero and never below,
 //! predictions are cut there as well.
 
+mod blockwise;
+mod dataset;
+
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
@@ -23,13 +26,10 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::reconstruct::quantum_of;
 use crate::recording::Recording;
-use crate::simulation::{Prediction, ReplayInput, replay};
-
-/// Length of a block of means, s.
-const BLOCK_S: f64 = 0.05;
-
-/// Length of a block of flutter, s.
-const FLUTTER_S: f64 = 0.5;
+use crate::simulation::{Prediction, ReplayInput, replay_into};
+use blockwise::{Blockwise, Moments, moments, moments_of};
+pub use dataset::Block;
+use dataset::Dataset;
 
 /// Share of a channel's standard deviation that counts as agreement.
 const MODEL_FLOOR: f64 = 0.015;
@@ -39,15 +39,6 @@ const ANGLE_FLOOR: f64 = 0.002;
 
 /// Residual at which the soft L1 loss bends, in scales.
 const LOSS_BEND: f64 = 3.0;
-
-/// Time at the start of each recording that is not compared, s: how it came to rest is not known.
-const LEAD_IN_S: f64 = 0.3;
-
-/// Length of the stretches that are held out in turn, s.
-const STRETCH_S: f64 = 1.0;
-
-/// Samples on zero from which on an amplifier of tension is taken to have stood at its end.
-const SAMPLES_AT_ZERO: usize = 20;
 
 /// What the residual of one series measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -87,19 +78,6 @@ pub enum Part {
     HeldOut,
 }
 
-#[derive(Clone, Debug)]
-struct Dataset {
-    input: ReplayInput,
-    measured: Vec<(Series, Vec<f64>)>,
-    /// Moments of every series of `measured` over every block: a fit compares with them thousands of times.
-    moments: Vec<Vec<Moments>>,
-    blocks: Vec<Block>,
-    /// Groups of consecutive blocks, as ranges into `blocks`.
-    flutter: Vec<std::ops::Range<usize>>,
-    /// Tensions that stood at the lower end of their amplifier.
-    cut_at_zero: Vec<Channel>,
-}
-
 /// What one residual compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aspect {
@@ -120,17 +98,6 @@ pub struct Entry {
     pub block: Block,
     /// What is compared.
     pub aspect: Aspect,
-}
-
-/// Samples that are compared as one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
-    /// First sample.
-    pub start: usize,
-    /// One past the last sample.
-    pub end: usize,
-    /// Use of the block.
-    pub part: Part,
 }
 
 /// Recordings, prepared for comparison.
@@ -278,12 +245,20 @@ impl Objective {
         })
     }
 
-    /// Replays every recording with `model`.
+    /// Replays every recording with `model`: what was measured, and the current of the motor.
     ///
     /// # Errors
     /// When the model cannot be driven.
     pub fn predict(&self, model: &JointModel) -> Result<Vec<Prediction>, Failure> {
-        self.datasets.iter().map(|dataset| Ok(dataset.cut(replay(model, &dataset.input)?))).collect()
+        self.datasets.iter().map(|dataset| dataset.replay(model)).collect()
+    }
+
+    /// The same of the first recording alone.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn predict_first(&self, model: &JointModel) -> Result<Prediction, Failure> {
+        self.datasets.first().map_or_else(|| Ok(Prediction::default()), |dataset| dataset.replay(model))
     }
 
     /// Residuals of `model`.
@@ -291,7 +266,13 @@ impl Objective {
     /// # Errors
     /// When the model cannot be driven.
     pub fn residuals(&self, model: &JointModel) -> Result<Residuals, Failure> {
-        Ok(self.compare(&self.predict(model)?))
+        let mut values = Vec::new();
+        for dataset in &self.datasets {
+            let mut seen = Blockwise::new(dataset);
+            replay_into(model, &dataset.input, &dataset.outputs, &mut seen)?;
+            self.append(dataset, &seen.simulated, &mut values);
+        }
+        Ok(Residuals { values })
     }
 
     /// Residuals where `predictions` are seen with one more effect on sensors whose channels drive nothing.
@@ -303,13 +284,20 @@ impl Objective {
         predictions: &[Prediction],
         effect: ActiveEffect,
     ) -> Result<Residuals, Failure> {
-        let seen: Result<Vec<Prediction>, Failure> = self
-            .datasets
-            .iter()
-            .zip(predictions)
-            .map(|(dataset, prediction)| Ok(dataset.cut(prediction.seen_through(effect, &dataset.input)?)))
-            .collect();
-        Ok(self.compare(&seen?))
+        let mut values = Vec::new();
+        for (dataset, prediction) in self.datasets.iter().zip(predictions) {
+            let seen = |(series, _): &(Series, _)| match series {
+                Series::Channel(channel) if effect.target.includes(*channel) => {
+                    let mut seen = prediction.seen_through(*channel, effect, &dataset.input)?;
+                    dataset.cut(*channel, &mut seen);
+                    Ok(moments_of(&seen, &dataset.blocks))
+                }
+                _ => Ok(dataset.moments_in(prediction, *series)),
+            };
+            let simulated: Result<Vec<_>, Failure> = dataset.measured.iter().map(seen).collect();
+            self.append(dataset, &simulated?, &mut values);
+        }
+        Ok(Residuals { values })
     }
 
     /// Residuals of given predictions.
@@ -317,40 +305,43 @@ impl Objective {
     pub fn compare(&self, predictions: &[Prediction]) -> Residuals {
         let mut values = Vec::new();
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
-            for ((series, measured), moments_of) in dataset.measured.iter().zip(&dataset.moments) {
-                let scale = self.scale(*series);
-                let predicted = series.of(prediction).unwrap_or(&[]);
-                let offset = self.offset(*series, dataset, measured, predicted);
-                let noise_variance = self.noise_variance(*series);
-                let mut scatter = Vec::with_capacity(dataset.blocks.len());
-                for (block, real) in dataset.blocks.iter().zip(moments_of) {
-                    let simulated = moments(&predicted[block.start..block.end]);
-                    values.push((real.mean - simulated.mean - offset) / scale);
-                    scatter.push([real.variance, simulated.variance + noise_variance]);
-                }
-                for group in &dataset.flutter {
-                    let blocks = (group.end - group.start) as f64;
-                    let [real, simulated] = scatter[group.clone()]
-                        .iter()
-                        .fold([0.0; 2], |sum, pair| [sum[0] + pair[0] / blocks, sum[1] + pair[1] / blocks])
-                        .map(f64::sqrt);
-                    values.push((real - simulated) / scale);
-                }
-            }
+            let series = dataset.measured.iter().map(|(series, _)| *series);
+            let simulated: Vec<_> = series.map(|series| dataset.moments_in(prediction, series)).collect();
+            self.append(dataset, &simulated, &mut values);
         }
         Residuals { values }
     }
 
+    /// Residuals of one recording, in scales; `simulated` has what was simulated of every series, block by block.
+    fn append(&self, dataset: &Dataset, simulated: &[Vec<Moments>], values: &mut Vec<f64>) {
+        for (((series, _), real), simulated) in dataset.measured.iter().zip(&dataset.moments).zip(simulated) {
+            let scale = self.scale(*series);
+            let noise_variance = self.noise_variance(*series);
+            let offset = self.offset(*series, dataset, real, simulated);
+            let pairs = || real.iter().zip(simulated);
+            values.extend(pairs().map(|(real, simulated)| (real.mean - simulated.mean - offset) / scale));
+            for group in &dataset.flutter {
+                let blocks = (group.end - group.start) as f64;
+                let [real, simulated] = pairs()
+                    .skip(group.start)
+                    .take(group.end - group.start)
+                    .map(|(real, simulated)| [real.variance, simulated.variance + noise_variance])
+                    .fold([0.0; 2], |sum, pair| [sum[0] + pair[0] / blocks, sum[1] + pair[1] / blocks])
+                    .map(f64::sqrt);
+                values.push((real - simulated) / scale);
+            }
+        }
+    }
+
     /// Zero of a channel in one recording, where the rig says that it is arbitrary; else 0.
-    fn offset(&self, series: Series, dataset: &Dataset, measured: &[f64], predicted: &[f64]) -> f64 {
+    fn offset(&self, series: Series, dataset: &Dataset, real: &[Moments], simulated: &[Moments]) -> f64 {
         match series {
             Series::Channel(channel) if self.free_offsets.contains(&channel) => {
                 let (mut sum, mut count) = (0.0, 0.0);
-                for block in &dataset.blocks {
-                    for k in block.start..block.end {
-                        sum += measured[k] - predicted[k];
-                        count += 1.0;
-                    }
+                for ((block, real), simulated) in dataset.blocks.iter().zip(real).zip(simulated) {
+                    let samples = (block.end - block.start) as f64;
+                    sum += samples * (real.mean - simulated.mean);
+                    count += samples;
                 }
                 sum / f64::max(count, 1.0)
             }
@@ -388,9 +379,11 @@ impl Objective {
     pub fn rmse(&self, predictions: &[Prediction], series: Series, part: Part) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
-            let Some((_, measured)) = dataset.measured.iter().find(|(s, _)| *s == series) else { continue };
+            let Some(place) = dataset.measured.iter().position(|(s, _)| *s == series) else { continue };
+            let measured = &dataset.measured[place].1;
             let predicted = series.of(prediction).unwrap_or(&[]);
-            let offset = self.offset(series, dataset, measured, predicted);
+            let simulated = moments_of(predicted, &dataset.blocks);
+            let offset = self.offset(series, dataset, &dataset.moments[place], &simulated);
             for block in dataset.blocks.iter().filter(|block| block.part == part) {
                 for k in block.start..block.end {
                     sum += (measured[k] - predicted[k] - offset).powi(2);
@@ -400,73 +393,6 @@ impl Objective {
         }
         f64::sqrt(sum / f64::max(count, 1.0))
     }
-}
-
-impl Dataset {
-    /// What the amplifiers of this recording would have shown.
-    fn cut(&self, mut prediction: Prediction) -> Prediction {
-        for channel in &self.cut_at_zero {
-            prediction.cut_below_zero(*channel);
-        }
-        prediction
-    }
-
-    fn new(model: &JointModel, recording: &Recording, part: Part, split: bool) -> Result<Self, Failure> {
-        let mut input = ReplayInput::new(model, recording)?;
-        if input.motion().is_none()
-            && let Some(theta) = recording.channel(Channel::ThetaIn).or(recording.channel(Channel::ThetaOut))
-        {
-            input.start_at(theta[0], 0.0);
-        }
-        let mut measured: Vec<(Series, Vec<f64>)> = model
-            .outputs
-            .iter()
-            .filter_map(|channel| {
-                recording.channel(*channel).map(|v| (Series::Channel(*channel), v.to_vec()))
-            })
-            .collect();
-        if model.drive()? == crate::joint_model::Drive::GuidedMotor {
-            measured.push((Series::Guide, vec![0.0; recording.len()]));
-        }
-        let t_s = input.t_s();
-        let mut blocks: Vec<Block> = Vec::new();
-        let mut start =
-            t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
-        while start < t_s.len() {
-            let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
-            let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
-            let held = split && stretch % 3 == 2;
-            blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });
-            start = end;
-        }
-        let mut flutter: Vec<std::ops::Range<usize>> = Vec::new();
-        for (index, block) in blocks.iter().enumerate() {
-            match flutter.last_mut() {
-                Some(group)
-                    if blocks[group.start].part == block.part
-                        && t_s[block.end - 1] - t_s[blocks[group.start].start] < FLUTTER_S =>
-                {
-                    group.end = index + 1;
-                }
-                _ => flutter.push(index..index + 1),
-            }
-        }
-        let moments = measured
-            .iter()
-            .map(|(_, values)| blocks.iter().map(|block| moments(&values[block.start..block.end])).collect())
-            .collect();
-        let cut_at_zero = Channel::TENSIONS
-            .into_iter()
-            .filter(|channel| recording.channel(*channel).is_some_and(stood_at_zero))
-            .collect();
-        Ok(Self { input, measured, moments, blocks, flutter, cut_at_zero })
-    }
-}
-
-/// Whether a sensor that reads from zero stood there: often exactly zero and never less.
-fn stood_at_zero(values: &[f64]) -> bool {
-    values.iter().all(|value| *value >= 0.0)
-        && values.iter().filter(|value| **value == 0.0).count() >= SAMPLES_AT_ZERO
 }
 
 /// Loss of a residual: `r²` up to the bend, growing with `|r|` beyond.
@@ -480,19 +406,6 @@ pub fn loss(residual: f64) -> f64 {
 pub fn soft(residual: f64) -> f64 {
     let z = residual / LOSS_BEND;
     LOSS_BEND * (2.0 * ((1.0 + z * z).sqrt() - 1.0)).sqrt().copysign(residual)
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Moments {
-    mean: f64,
-    variance: f64,
-}
-
-fn moments(values: &[f64]) -> Moments {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    Moments { mean, variance }
 }
 
 fn recorded(datasets: &[Dataset], series: Series) -> impl Iterator<Item = &[f64]> {
@@ -538,7 +451,28 @@ mod tests {
     use bowden_model::effects::find;
 
     use super::*;
+    use crate::simulation::replay;
     use crate::test_bench;
+
+    /// What a fit compares block by block is what stands in whole predictions, bit for bit: amplifiers that stop at zero, an angle
+    /// whose zero is free, and the torque that guides a motor among it.
+    #[test]
+    fn a_replay_compared_as_it_runs_is_compared_as_a_whole() {
+        let samples = 2345;
+        let mut recording = test_bench::swung(samples);
+        let wave = |k: u32| 0.12 * (4e-3 * f64::from(k)).cos() + 0.05;
+        recording.set(Channel::Duty, (0..samples).map(wave).collect());
+        recording.set(Channel::BusVoltage, vec![24.0; samples as usize]);
+        let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        model.free_offsets = vec![Channel::ThetaOut];
+        let objective = Objective::new(&model, &[recording.clone(), recording], &[], true).unwrap();
+        assert!(objective.datasets[0].cut_at_zero.contains(&Channel::F1));
+        assert!(objective.scales().iter().any(|(series, _)| *series == Series::Guide));
+        let as_it_runs = objective.residuals(&model).unwrap();
+        assert_eq!(as_it_runs, objective.compare(&objective.predict(&model).unwrap()));
+        assert_eq!(as_it_runs.values.len(), objective.entries().count());
+        assert!(as_it_runs.values.iter().any(|value| value.abs() > 1.0));
+    }
 
     /// A nominal tendon pushes where the real one hangs slack and its amplifier reads zero. Only where it does is the
     /// prediction cut.

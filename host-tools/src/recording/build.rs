@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
+use std::sync::Arc;
 
 use bowden_model::channel::Channel;
 
@@ -71,7 +72,7 @@ impl Table {
         for (index, name) in names.iter().enumerate() {
             while let Some((_, channel, source)) = wanted.next_if(|(at, ..)| *at == index) {
                 table.routes[index].known.push((table.columns.len(), source));
-                table.columns.push(Column::Known { channel, values: Vec::new() });
+                table.columns.push(Column::Known { channel, values: Arc::default() });
             }
             let route = &mut table.routes[index];
             let used = route.time.is_some() || !route.known.is_empty();
@@ -128,7 +129,7 @@ impl Table {
                 }
                 for (column, source) in &route.known {
                     if let Column::Known { values, .. } = &mut self.columns[*column] {
-                        values.push(source.apply(value));
+                        Arc::make_mut(values).push(source.apply(value));
                     }
                 }
             }
@@ -147,7 +148,7 @@ impl Table {
         self.t_s.truncate(rows);
         for column in &mut self.columns {
             match column {
-                Column::Known { values, .. } => values.truncate(rows),
+                Column::Known { values, .. } => Arc::make_mut(values).truncate(rows),
                 Column::Unknown(text) => text.truncate(rows),
             }
         }
@@ -158,7 +159,7 @@ impl Table {
         self.t_s.shrink_to_fit();
         for column in &mut self.columns {
             if let Column::Known { values, .. } = column {
-                values.shrink_to_fit();
+                Arc::make_mut(values).shrink_to_fit();
             }
         }
         (self.t_s, self.columns)

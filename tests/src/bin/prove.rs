@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
+use bowden_tests::prove::lengths::{self, LENGTHENED, Lengths, lengths};
 use bowden_tests::prove::outcome::{Log, Outcome};
 use bowden_tests::prove::page::{Provenance, render};
 use bowden_tests::prove::plan::{Group, Plan, plans, quick_sample};
@@ -62,7 +63,7 @@ struct Options {
     proof: Option<PathBuf>,
 }
 
-/// What is shown without running anything.
+/// What is shown instead of a run.
 #[derive(Debug, Args)]
 struct Show {
     /// List the cases with their seeds and do nothing
@@ -71,6 +72,10 @@ struct Show {
     /// Run nothing: print what has been done so far with this binary
     #[arg(long)]
     so_far: bool,
+    /// What longer recordings cost: time and memory of two cases, or those of --only, at 40 s, six minutes and an hour, which
+    /// takes half an hour
+    #[arg(long)]
+    lengths: bool,
 }
 
 /// Other tools on the same files.
@@ -127,6 +132,9 @@ fn prove(options: &Options) -> Result<bool, String> {
     let jobs = usize::from(options.jobs);
     let threads = (processors / jobs).max(1);
     let tool = Tool::new(&bowden, threads)?;
+    if options.show.lengths {
+        return cost_of_length(&tool, &plans, options);
+    }
     let log = Log::open(&folder.join("results.jsonl"))?;
     let rivals = match rivals {
         Some(rivals) => Some((rivals, Log::open(&folder.join("rivals.jsonl"))?)),
@@ -159,6 +167,17 @@ fn prove(options: &Options) -> Result<bool, String> {
         println!("written to {}", proof.display());
     }
     Ok(!options.strict || summary.goals().iter().all(|goal| goal.met != Some(false)))
+}
+
+/// Prints what longer recordings cost; whether an hour takes no more memory than it may, or need not.
+fn cost_of_length(tool: &Tool, plans: &[Plan], options: &Options) -> Result<bool, String> {
+    let is_asked = |plan: &&Plan| !options.only.is_empty() || LENGTHENED.contains(&plan.name.as_str());
+    let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
+    let all: Result<Vec<Lengths>, String> =
+        plans.iter().filter(is_asked).map(|plan| lengths(tool, plan, folder.path())).collect();
+    let (page, met) = lengths::page(&all?);
+    print!("{page}");
+    Ok(met || !options.strict)
 }
 
 /// The cases that the options ask for.

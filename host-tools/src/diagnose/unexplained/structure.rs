@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::samples::{Left, Samples, Variable};
 use super::shape::{Factor, Fitted, Rows, Shape, best_rate, best_spot, ends_of};
+use crate::diagnose::locked::FEWEST_PERIODS;
 use crate::fit::objective::Series;
 
 /// Nodes of a curve over position: wide features with few, narrow ones with many.
@@ -15,9 +16,6 @@ const NODES: [usize; 2] = [16, 40];
 
 /// Waves of a pattern that repeats with position.
 const WAVES: usize = 2;
-
-/// Fewest periods that a position-locked pattern must show in the travel.
-const FEWEST_PERIODS: f64 = 1.5;
 
 /// Half widths of a spot that rubs, as parts of the travel: what is wider is a curve.
 const REACHES: [f64; 4] = [0.04, 0.055, 0.075, 0.1];
@@ -94,20 +92,16 @@ fn bar(shape: Shape, series: Series) -> Bar {
 
 /// The strongest structure that stands above its bar.
 pub(crate) fn strongest(samples: &Samples) -> Option<Structure> {
-    let all: Vec<Vec<(Shape, Fitted)>> = samples.left.par_iter().map(|left| tried(samples, left)).collect();
     let clear = |left: &Left, (shape, fitted): &(Shape, Fitted)| {
         let bar = bar(*shape, left.series);
         fitted.share() >= bar.share && fitted.removed() >= bar.removed
     };
-    let (left, forms) = samples
+    let all: Vec<Vec<(Shape, Fitted)>> = samples
         .left
-        .iter()
-        .zip(all)
-        .map(|(left, forms)| {
-            let forms: Vec<_> = forms.into_iter().filter(|form| clear(left, form)).collect();
-            (left, forms)
-        })
-        .max_by(|(_, a), (_, b)| most(a).total_cmp(&most(b)))?;
+        .par_iter()
+        .map(|left| tried(samples, left).filter(|form| clear(left, form)).collect())
+        .collect();
+    let (left, forms) = samples.left.iter().zip(all).max_by(|(_, a), (_, b)| most(a).total_cmp(&most(b)))?;
     // Of equals the first, which needs fewest numbers.
     let best = forms.iter().rev().max_by(|(_, a), (_, b)| a.removed().total_cmp(&b.removed()))?;
     let (variable, enough) = (best.0.variable(), AS_GOOD * best.1.removed());
@@ -122,8 +116,7 @@ pub(crate) fn dependence(samples: &Samples, left: &Left) -> Vec<(Shape, Fitted)>
     /// Share that a variable must account for to be named.
     const NAMED_SHARE: f64 = 0.2;
     let mut found: Vec<(Shape, Fitted)> = Vec::new();
-    let mut forms = tried(samples, left);
-    forms.retain(|(_, fitted)| fitted.share() > NAMED_SHARE);
+    let mut forms: Vec<_> = tried(samples, left).filter(|(_, fitted)| fitted.share() > NAMED_SHARE).collect();
     forms.sort_by(|(_, a), (_, b)| b.removed().total_cmp(&a.removed()));
     for form in forms {
         if found.iter().all(|(shape, _)| shape.variable() != form.0.variable()) {
@@ -138,7 +131,7 @@ fn most(forms: &[(Shape, Fitted)]) -> f64 {
 }
 
 /// Every form that can be fitted to a series, those with few numbers first.
-fn tried(samples: &Samples, left: &Left) -> Vec<(Shape, Fitted)> {
+fn tried(samples: &Samples, left: &Left) -> impl Iterator<Item = (Shape, Fitted)> {
     let curve = |of, nodes, times| Shape::Curve { of, nodes, times };
     let positions = [Variable::ThetaOut, Variable::ThetaIn];
     let mut shapes: Vec<Shape> = Vec::new();
@@ -156,7 +149,7 @@ fn tried(samples: &Samples, left: &Left) -> Vec<(Shape, Fitted)> {
     shapes.push(curve(Variable::Speed, NODES[0], Factor::One));
     shapes.push(curve(Variable::Tension, NODES[0], Factor::One));
     shapes.push(curve(Variable::Time, 0, Factor::One));
-    shapes.into_iter().filter_map(|shape| Some((shape, shape.fit(samples, &left.soft)?))).collect()
+    shapes.into_iter().filter_map(|shape| Some((shape, shape.fit(samples, &left.soft)?)))
 }
 
 /// Wave over time, times the current or not, that takes most off the rows that may be fitted, in the longest recording.

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 
 use super::locate::{Answer, component};
 use super::samples::{Left, Samples, Variable};
-use super::shape::{Factor, Shape};
+use super::shape::{Factor, Shape, best_spot};
 use super::structure::strongest;
 use super::{Unexplained, described};
 use crate::fit::objective::Series;
@@ -187,6 +187,16 @@ fn what_rubs_at_one_place_is_found_there() {
     assert!((forward[0] - 0.1).abs() < 0.03, "middle {} rad", forward[0]);
     // 0.5 N a scale.
     assert!((forward[1] - 2.0).abs() < 0.25 && forward[1] == -backward[1], "{forward:?} {backward:?}");
+}
+
+/// A place that is passed one way alone could as well push that way always.
+#[test]
+fn a_spot_is_looked_for_where_it_is_passed_both_ways() {
+    let there_and_back: Vec<f64> = (0..800_i32).map(|k| f64::from(400 - (k - 400).abs()) / 400.0).collect();
+    let values = vec![1.0; 800];
+    let turning: Vec<f64> = (0..800).map(|k| if k < 400 { 1.0 } else { -1.0 }).collect();
+    assert!(best_spot(&there_and_back, &turning, &values, 0.1).is_some());
+    assert_eq!(best_spot(&there_and_back, &[1.0; 800], &values, 0.1), None);
 }
 
 /// A torque constant that swings by a share s makes the torque wrong by s times what the current makes.

@@ -1,0 +1,140 @@
+//! One recording, prepared for comparison: what goes into its replays, what they are compared with, and over which blocks.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bowden_model::channel::Channel;
+
+use super::blockwise::{Moments, moments_of};
+use super::{Part, Series};
+use crate::joint_model::{Drive, JointModel};
+use crate::outcome::Failure;
+use crate::recording::Recording;
+use crate::simulation::{Prediction, ReplayInput, replay_of};
+
+/// Length of a block of means, s.
+const BLOCK_S: f64 = 0.05;
+
+/// Length of a block of flutter, s.
+const FLUTTER_S: f64 = 0.5;
+
+/// Time at the start of each recording that is not compared, s: how it came to rest is not known.
+const LEAD_IN_S: f64 = 0.3;
+
+/// Length of the stretches that are held out in turn, s.
+const STRETCH_S: f64 = 1.0;
+
+/// Samples on zero from which on an amplifier of tension is taken to have stood at its end.
+const SAMPLES_AT_ZERO: usize = 20;
+
+/// Samples that are compared as one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// First sample.
+    pub start: usize,
+    /// One past the last sample.
+    pub end: usize,
+    /// Use of the block.
+    pub part: Part,
+}
+
+/// The recording.
+#[derive(Clone, Debug)]
+pub(super) struct Dataset {
+    pub(super) input: ReplayInput,
+    /// What replays predict: the measured channels, and the current of the motor, which heats it.
+    pub(super) outputs: Vec<Channel>,
+    pub(super) measured: Vec<(Series, Arc<Vec<f64>>)>,
+    /// Moments of every series of `measured` over every block: a fit compares with them thousands of times.
+    pub(super) moments: Vec<Vec<Moments>>,
+    pub(super) blocks: Vec<Block>,
+    /// Groups of consecutive blocks, as ranges into `blocks`.
+    pub(super) flutter: Vec<Range<usize>>,
+    /// Tensions that stood at the lower end of their amplifier.
+    pub(super) cut_at_zero: Vec<Channel>,
+}
+
+impl Dataset {
+    /// What the sensors of this recording would have shown of `model`.
+    pub(super) fn replay(&self, model: &JointModel) -> Result<Prediction, Failure> {
+        let mut prediction = replay_of(model, &self.input, &self.outputs)?;
+        for (channel, values) in prediction.channels_mut() {
+            self.cut(channel, values);
+        }
+        Ok(prediction)
+    }
+
+    /// What an amplifier shows that stands at its end.
+    pub(super) fn cut(&self, channel: Channel, values: &mut [f64]) {
+        if self.cut_at_zero.contains(&channel) {
+            for value in values {
+                *value = value.max(0.0);
+            }
+        }
+    }
+
+    /// Moments of a series as predicted.
+    pub(super) fn moments_in(&self, prediction: &Prediction, series: Series) -> Vec<Moments> {
+        moments_of(series.of(prediction).unwrap_or_default(), &self.blocks)
+    }
+
+    pub(super) fn new(
+        model: &JointModel,
+        recording: &Recording,
+        part: Part,
+        split: bool,
+    ) -> Result<Self, Failure> {
+        let mut input = ReplayInput::new(model, recording)?;
+        if input.motion().is_none()
+            && let Some(theta) = recording.channel(Channel::ThetaIn).or(recording.channel(Channel::ThetaOut))
+        {
+            input.start_at(theta[0], 0.0);
+        }
+        let mut measured: Vec<(Series, Arc<Vec<f64>>)> = model
+            .outputs
+            .iter()
+            .filter_map(|channel| recording.shared(*channel).map(|v| (Series::Channel(*channel), v)))
+            .collect();
+        let is_kept =
+            |channel: &&Channel| **channel == Channel::MotorCurrent || recording.channel(**channel).is_some();
+        let outputs = model.outputs.iter().filter(is_kept).copied().collect();
+        if model.drive()? == Drive::GuidedMotor {
+            measured.push((Series::Guide, Arc::new(vec![0.0; recording.len()])));
+        }
+        let t_s = input.t_s();
+        let mut blocks: Vec<Block> = Vec::new();
+        let mut start =
+            t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
+        while start < t_s.len() {
+            let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
+            let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
+            let held = split && stretch % 3 == 2;
+            blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });
+            start = end;
+        }
+        let mut flutter: Vec<Range<usize>> = Vec::new();
+        for (index, block) in blocks.iter().enumerate() {
+            match flutter.last_mut() {
+                Some(group)
+                    if blocks[group.start].part == block.part
+                        && t_s[block.end - 1] - t_s[blocks[group.start].start] < FLUTTER_S =>
+                {
+                    group.end = index + 1;
+                }
+                _ => flutter.push(index..index + 1),
+            }
+        }
+        let moments = measured.iter().map(|(_, values)| moments_of(values, &blocks)).collect();
+        let cut_at_zero = Channel::TENSIONS
+            .into_iter()
+            .filter(|channel| recording.channel(*channel).is_some_and(stood_at_zero))
+            .collect();
+        Ok(Self { input, outputs, measured, moments, blocks, flutter, cut_at_zero })
+    }
+}
+
+/// Whether a sensor that reads from zero stood there: often exactly zero and never less.
+fn stood_at_zero(values: &[f64]) -> bool {
+    values.iter().all(|value| *value >= 0.0)
+        && values.iter().filter(|value| **value == 0.0).count() >= SAMPLES_AT_ZERO
+}
