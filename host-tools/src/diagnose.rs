@@ -55,9 +55,9 @@ const SEARCH_ELEMENTS: std::ops::RangeInclusive<usize> = 4..=8;
 /// Simulation step while candidates are tried, s.
 const SEARCH_STEP_S: f64 = 1e-3;
 
-/// Share of the held-out loss of the recalibrated rig that the diagnosed one must take off, for what was found to be said. On
-/// virtual benches (`heldout_loss` in each `diagnosis.json` of `prove`), what is named and there takes off 9.9 % or more; what was
-/// named on one that hides nothing, 0.4 %.
+/// Share of the held-out loss of the recalibrated rig that the diagnosed one must take off, for what was found to be said
+/// (`heldout_loss` in each `diagnosis.json` of `prove`): far below it lies what imitates the rest of an ordinary bench, above it
+/// what is there.
 const PAYING_SHARE: f64 = 0.05;
 
 /// Optimiser evaluations per parameter of the last fit.

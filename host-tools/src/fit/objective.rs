@@ -474,6 +474,31 @@ mod tests {
         assert!(as_it_runs.values.iter().any(|value| value.abs() > 1.0));
     }
 
+    /// Where the zero of an angle is free, another zero changes nothing, and where it is not, everything.
+    #[test]
+    fn a_free_zero_makes_no_difference() {
+        let with_zero_at = |zero_rad: f64| {
+            let theta_out_rad = |k: u32| 0.35 * (4e-3 * f64::from(k)).sin() + zero_rad;
+            test_bench::swung(2345).with(Channel::ThetaOut, (0..2345).map(theta_out_rad).collect())
+        };
+        let (recording, shifted) = (with_zero_at(0.0), with_zero_at(0.1));
+        let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let mut seen = |free_offsets: &[Channel], recording: &Recording| {
+            model.free_offsets = free_offsets.to_vec();
+            let objective = Objective::new(&model, std::slice::from_ref(recording), &[], true).unwrap();
+            let predictions = objective.predict(&model).unwrap();
+            let rmse = objective.rmse(&predictions, Series::Channel(Channel::ThetaOut), Part::HeldOut);
+            (rmse, objective.residuals(&model).unwrap().values)
+        };
+        let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let [(rmse, plain), (rmse_shifted, other)] =
+            [&recording, &shifted].map(|recording| seen(&[Channel::ThetaOut], recording));
+        assert!((rmse - rmse_shifted).abs() < 1e-9 && change(&plain, &other) < 1e-6);
+        let (stated, all) = seen(&[], &recording);
+        let (stated_shifted, all_shifted) = seen(&[], &shifted);
+        assert!((stated_shifted - stated).abs() > 0.01 && change(&all, &all_shifted) > 1.0);
+    }
+
     /// A nominal tendon pushes where the real one hangs slack and its amplifier reads zero. Only where it does is the
     /// prediction cut.
     #[test]
