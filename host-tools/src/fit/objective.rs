@@ -474,6 +474,21 @@ mod tests {
         assert!(as_it_runs.values.iter().any(|value| value.abs() > 1.0));
     }
 
+    /// What was not measured is not compared, but a winding heats whether its current was recorded or not.
+    #[test]
+    fn of_what_was_not_measured_the_current_alone_is_predicted() {
+        let mut recording = test_bench::swung(2000);
+        recording.set(Channel::Duty, vec![0.1; 2000]);
+        recording.set(Channel::BusVoltage, vec![24.0; 2000]);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let unmeasured = [Channel::MotorCurrent, Channel::ThetaMotor];
+        assert!(unmeasured.iter().all(|channel| model.outputs.contains(channel)));
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let predictions = objective.predict(&model).unwrap();
+        let is_predicted = |channel| predictions[0].channel(channel).is_some();
+        assert_eq!(unmeasured.map(is_predicted), [true, false]);
+    }
+
     /// Where the zero of an angle is free, another zero changes nothing, and where it is not, everything.
     #[test]
     fn a_free_zero_makes_no_difference() {
