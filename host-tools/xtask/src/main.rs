@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod browser;
 mod clippy;
 mod core_from_source;
 mod cross_target;

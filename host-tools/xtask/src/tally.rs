@@ -13,7 +13,7 @@ pub struct Tally {
     passed: u32,
     failed: u32,
     ignored: u32,
-    /// Passed without having done anything, for want of recordings.
+    /// Passed without having done anything, for want of recordings or a browser.
     skipped: u32,
     failures: Vec<String>,
 }
@@ -88,7 +88,7 @@ impl fmt::Display for Tally {
             write!(f, ", {} ignored", self.ignored)?;
         }
         if self.skipped > 0 {
-            write!(f, ", of which {} had no recordings and did nothing", self.skipped)?;
+            write!(f, ", of which {} lacked recordings or a browser and did nothing", self.skipped)?;
         }
         Ok(())
     }
@@ -112,7 +112,7 @@ mod tests {
         let tally = tally(lines);
         assert_eq!(
             tally.to_string(),
-            "15 tests passed in 2 programs, 1 ignored, of which 1 had no recordings and did nothing"
+            "15 tests passed in 2 programs, 1 ignored, of which 1 lacked recordings or a browser and did nothing"
         );
         assert_eq!(tally.clone().outcome(true), Ok(tally));
     }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::parts::Parts;
 use crate::process::{self, EMULATED_BOARD, built, cargo, shared};
 use crate::tally::Tally;
-use crate::{cross_target, firmware, system_packages};
+use crate::{browser, cross_target, firmware, system_packages};
 
 /// Runs the tests; the closing lines say what has run and how it went. A part that fails does not stop the other.
 ///
@@ -61,16 +61,18 @@ fn timed(part: &'static str, run: impl FnOnce() -> Result<String, String>) -> Ou
 /// Tests of everything that is built for the host, but for the emulated board.
 fn host() -> Result<String, String> {
     let data = shared().join("data");
+    let recordings = if data.is_dir() { Ok(()) } else { Err(format!("{} is not there", data.display())) };
     let mut tests = cargo(&["test", "--no-fail-fast"]);
-    if data.is_dir() {
-        println!("real recordings: {}", data.display());
-    } else {
+    let mut lacking = false;
+    for (what, found) in [("real recordings", recordings), ("Chromium", browser::ensure())] {
+        if let Err(reason) = found {
+            println!("{what}: none, {reason}; each test that misses it prints a line `skipped: ...`");
+            lacking = true;
+        }
+    }
+    if lacking {
         // Passed tests are silent otherwise, and a skipped one passes.
         tests.args(["--", "--show-output"]);
-        println!(
-            "real recordings: none, {} is not there; each test that misses one prints a line `skipped: ...`",
-            data.display()
-        );
     }
     Tally::of(&mut tests).map(|tally| tally.to_string())
 }
