@@ -355,3 +355,16 @@ fn search_round(round: &Round) -> SearchRound {
     };
     SearchRound { loss_before: round.loss_before, tried: round.candidates.iter().map(attempt).collect() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::pays;
+
+    #[test]
+    fn physics_pays_by_its_share_of_the_held_out_loss() {
+        for scale in [0.01, 1.0, 100.0] {
+            assert!(pays(scale, 0.94 * scale) && !pays(scale, 0.96 * scale), "scale {scale}");
+        }
+        assert!(!pays(1.0, 1.1), "worse than without");
+    }
+}

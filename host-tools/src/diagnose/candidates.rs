@@ -114,7 +114,11 @@ fn starts(
     match base.descriptor().id {
         "motor_cogging" => cogging_start(base, objective, predictions).into_iter().collect(),
         "joint_torque_ripple" => ripple_start(base, model, objective, predictions).into_iter().collect(),
-        "winding_heating" => heating_starts(base, model, predictions),
+        "winding_heating" => {
+            let currents =
+                predictions.iter().filter_map(|prediction| prediction.channel(Channel::MotorCurrent));
+            heating_starts(base, model, currents.flatten().copied())
+        }
         "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
         "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
         "end_stop_contact" => end_stop_starts(base, model, objective),
@@ -191,10 +195,13 @@ fn from_neutral(base: ActiveEffect, factor: f64) -> f64 {
 
 /// Gains with which the power of the recordings, kept up, would raise the resistance by [`RISES`]: what a watt does to a winding
 /// depends on its size, which the rig file does not tell.
-fn heating_starts(base: ActiveEffect, model: &JointModel, predictions: &[Prediction]) -> Vec<ActiveEffect> {
-    let currents = predictions.iter().filter_map(|prediction| prediction.channel(Channel::MotorCurrent));
+fn heating_starts(
+    base: ActiveEffect,
+    model: &JointModel,
+    currents_a: impl Iterator<Item = f64>,
+) -> Vec<ActiveEffect> {
     let (mut squares, mut count) = (0.0, 0.0);
-    for current_a in currents.flatten() {
+    for current_a in currents_a {
         squares += current_a * current_a;
         count += 1.0;
     }
@@ -255,4 +262,59 @@ fn end_stop_starts(base: ActiveEffect, model: &JointModel, objective: &Objective
         })
         .filter(|start| start.parameters[1].abs() > 1e-3)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::effects::find;
+
+    use super::*;
+    use crate::simulation::replay;
+    use crate::test_bench;
+
+    fn tried(id: &str, change: impl Fn(JointModel) -> JointModel) -> Vec<ActiveEffect> {
+        let recording = test_bench::swung(200);
+        let model = change(JointModel::from_rig(&test_bench::rig(), &recording).unwrap());
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let predictions = [replay(&model, objective.input(0)).unwrap()];
+        let all = candidates(&model, &objective, &predictions, &[]);
+        all.into_iter()
+            .flat_map(|candidate| candidate.starts)
+            .filter(|start| start.descriptor().id == id)
+            .collect()
+    }
+
+    #[test]
+    fn a_joint_of_a_tenth_is_searched_for_torques_of_a_tenth() {
+        let paper = tried("joint_coulomb_friction", |model| model);
+        let finger = tried("joint_coulomb_friction", |model| test_bench::smaller(model, 0.1));
+        assert_eq!((paper.len(), finger.len()), (STEADY.len(), STEADY.len()));
+        for (a, b) in paper.iter().zip(&finger) {
+            assert!((b.parameters[0] / a.parameters[0] - 0.1).abs() < 1e-9, "{b:?} for {a:?}");
+        }
+    }
+
+    #[test]
+    fn a_spring_is_looked_for_at_rest_on_either_side_of_hanging_straight_down() {
+        let rests: Vec<f64> = tried("joint_spring", |model| model)
+            .iter()
+            .map(|start| start.parameters[start.descriptor().index_of("rest_rad").unwrap()])
+            .collect();
+        assert!(rests.iter().any(|rest| *rest > 0.03) && rests.iter().any(|rest| *rest < -0.03), "{rests:?}");
+    }
+
+    /// 2 A through 2 Ω are 8 W, at which 5 % more resistance are 0.00625 a watt.
+    #[test]
+    fn heating_is_looked_for_by_the_power_that_the_recordings_put_in() {
+        let mut model = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
+        let base = ActiveEffect::with_defaults(find("winding_heating").unwrap());
+        let gains = |model: &JointModel, currents_a: &[f64]| -> Vec<f64> {
+            let starts = heating_starts(base, model, currents_a.iter().copied());
+            starts.iter().map(|start| start.parameters[0]).collect()
+        };
+        model.parameters.motor.as_mut().unwrap().resistance_ohm = 2.0;
+        assert_eq!(gains(&model, &[2.0, -2.0, 2.0]), [0.05 / 8.0, 0.15 / 8.0, 0.45 / 8.0]);
+        assert_eq!(gains(&model, &[0.001]), [1.0; 3], "no more than the catalogue allows");
+        assert_eq!(gains(&model, &[]), [base.parameters[0]]);
+    }
 }
