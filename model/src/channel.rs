@@ -55,6 +55,20 @@ impl Channel {
     /// The four end tensions, cable a first, input end first.
     pub const TENSIONS: [Self; 4] = [Self::F1, Self::F2, Self::F3, Self::F4];
 
+    /// What a sensor shows, and its faults distort: all but what is commanded and the supply.
+    pub const SENSED: [Self; 10] = [
+        Self::F1,
+        Self::F2,
+        Self::F3,
+        Self::F4,
+        Self::ThetaIn,
+        Self::ThetaOut,
+        Self::ThetaMotor,
+        Self::TorqueIn,
+        Self::TorqueOut,
+        Self::MotorCurrent,
+    ];
+
     /// Column role as files write it.
     #[must_use]
     pub const fn role(self) -> &'static str {

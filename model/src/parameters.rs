@@ -63,6 +63,11 @@ pub struct LoadParameters {
     pub viscous_nm_s_per_rad: f64,
 }
 
+impl LoadParameters {
+    /// A joint that carries nothing.
+    pub const NONE: Self = Self { mass_kg: 0.0, arm_m: 0.0, inertia_kg_m2: 0.0, viscous_nm_s_per_rad: 0.0 };
+}
+
 /// What measures: resolutions and white noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorParameters {

@@ -552,12 +552,7 @@ impl Plant {
             self.turn_output(config, delta_rad);
             return;
         }
-        let load = config.parameters.load.unwrap_or(LoadParameters {
-            mass_kg: 0.0,
-            arm_m: 0.0,
-            inertia_kg_m2: 0.0,
-            viscous_nm_s_per_rad: 0.0,
-        });
+        let load = config.parameters.load.unwrap_or(LoadParameters::NONE);
         let port = self.joint_port(config, load.mass_kg, dt_s);
         let inside_play = self.joint_offset_rad.abs() < 0.5 * port.play_rad;
         // A joint without inertia cannot ring; there the speed of the last correction would only feed back into the next.
@@ -654,12 +649,7 @@ impl Plant {
             self.set_angle(input.theta_in_rad);
             return;
         }
-        let load = config.parameters.load.unwrap_or(LoadParameters {
-            mass_kg: 0.0,
-            arm_m: 0.0,
-            inertia_kg_m2: 0.0,
-            viscous_nm_s_per_rad: 0.0,
-        });
+        let load = config.parameters.load.unwrap_or(LoadParameters::NONE);
         let joint = self.joint_port(config, load.mass_kg, dt_s);
         let weight_nm = -joint.mass_kg * GRAVITY_M_S2 * load.arm_m * sin(self.theta_out_rad);
         let load_nm = weight_nm + joint.torque_nm + input.external_torque_nm;

@@ -12,18 +12,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
     summary: "a sensor has a wrong gain",
     parameters: &[ParameterSpec::log("gain", "1", [0.2, 5.0], 1.1, "shown over true")],
     neutral: Some(1.0),
-    channels: &[
-        Channel::F1,
-        Channel::F2,
-        Channel::F3,
-        Channel::F4,
-        Channel::ThetaIn,
-        Channel::ThetaOut,
-        Channel::ThetaMotor,
-        Channel::TorqueIn,
-        Channel::TorqueOut,
-        Channel::MotorCurrent,
-    ],
+    channels: &Channel::SENSED,
 };
 
 impl Effect for SensorGainError {

@@ -19,18 +19,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
         "time constant of the filter",
     )],
     neutral: None,
-    channels: &[
-        Channel::F1,
-        Channel::F2,
-        Channel::F3,
-        Channel::F4,
-        Channel::ThetaIn,
-        Channel::ThetaOut,
-        Channel::ThetaMotor,
-        Channel::TorqueIn,
-        Channel::TorqueOut,
-        Channel::MotorCurrent,
-    ],
+    channels: &Channel::SENSED,
 };
 
 impl Effect for SensorLag {

@@ -18,18 +18,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
         "shown minus true",
     )],
     neutral: Some(0.0),
-    channels: &[
-        Channel::F1,
-        Channel::F2,
-        Channel::F3,
-        Channel::F4,
-        Channel::ThetaIn,
-        Channel::ThetaOut,
-        Channel::ThetaMotor,
-        Channel::TorqueIn,
-        Channel::TorqueOut,
-        Channel::MotorCurrent,
-    ],
+    channels: &Channel::SENSED,
 };
 
 impl Effect for SensorOffset {

@@ -18,18 +18,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
         "largest value shown",
     )],
     neutral: None,
-    channels: &[
-        Channel::F1,
-        Channel::F2,
-        Channel::F3,
-        Channel::F4,
-        Channel::ThetaIn,
-        Channel::ThetaOut,
-        Channel::ThetaMotor,
-        Channel::TorqueIn,
-        Channel::TorqueOut,
-        Channel::MotorCurrent,
-    ],
+    channels: &Channel::SENSED,
 };
 
 impl Effect for SensorSaturation {
