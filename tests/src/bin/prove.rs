@@ -173,8 +173,19 @@ fn prove(options: &Options) -> Result<bool, String> {
 fn cost_of_length(tool: &Tool, plans: &[Plan], options: &Options) -> Result<bool, String> {
     let is_asked = |plan: &&Plan| !options.only.is_empty() || LENGTHENED.contains(&plan.name.as_str());
     let folder = tempfile::tempdir().map_err(|error| format!("temporary folder: {error}"))?;
-    let all: Result<Vec<Lengths>, String> =
-        plans.iter().filter(is_asked).map(|plan| lengths(tool, plan, folder.path())).collect();
+    let all: Result<Vec<Lengths>, String> = plans
+        .iter()
+        .filter(is_asked)
+        .map(|plan| {
+            // An hour of recording takes a quarter of an hour; whoever waits sees what is done.
+            lengths(tool, plan, folder.path(), |recorded_s, cost| {
+                eprintln!(
+                    "{}: {recorded_s:.0} s took {:.0} s and {:.0} MB",
+                    plan.name, cost.seconds, cost.peak_mb
+                );
+            })
+        })
+        .collect();
     let (page, met) = lengths::page(&all?);
     print!("{page}");
     Ok(met || !options.strict)

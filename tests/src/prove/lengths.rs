@@ -16,7 +16,7 @@ use super::truth::{TRAINING_S, believed_rig};
 pub const LENGTHENED: [&str; 2] = ["nothing/01", "single/motor_cogging/clear/quiet"];
 
 /// Times that the recording stands in the file, the last time an hour.
-pub const REPEATS: [usize; 3] = [1, 9, 90];
+pub const REPEATS: [u32; 3] = [1, 9, 90];
 
 /// Most that an hour at 1 kHz may take, MB.
 const MOST_MB: f64 = 1024.0;
@@ -30,11 +30,16 @@ pub struct Lengths {
     pub costs: Vec<(f64, Cost)>,
 }
 
-/// Diagnoses one case at every length in `folder`, which is made.
+/// Diagnoses one case at every length in `folder`, which is made; `done` hears of each.
 ///
 /// # Errors
 /// When the bench refuses the case, a file cannot be written, or the program fails.
-pub fn lengths(tool: &Tool, plan: &Plan, folder: &Path) -> Result<Lengths, String> {
+pub fn lengths(
+    tool: &Tool,
+    plan: &Plan,
+    folder: &Path,
+    done: impl Fn(f64, &Cost),
+) -> Result<Lengths, String> {
     let failed = |error: &dyn std::fmt::Display| format!("{}: {error}", folder.display());
     let case = plan.case().map_err(|error| format!("{}: {error}", plan.name))?;
     let recording =
@@ -49,7 +54,10 @@ pub fn lengths(tool: &Tool, plan: &Plan, folder: &Path) -> Result<Lengths, Strin
     for repeats in REPEATS {
         let train = File::create(folder.join("train.csv")).map_err(|error| failed(&error))?;
         write_repeated(&once, step_s, repeats, BufWriter::new(train)).map_err(|error| failed(&error))?;
-        costs.push((repeats as f64 * TRAINING_S, tool.diagnose(folder)?));
+        let cost = tool.patient(repeats).diagnose(folder)?;
+        let recorded_s = f64::from(repeats) * TRAINING_S;
+        done(recorded_s, &cost);
+        costs.push((recorded_s, cost));
     }
     Ok(Lengths { name: plan.name.clone(), costs })
 }
@@ -58,7 +66,7 @@ pub fn lengths(tool: &Tool, plan: &Plan, folder: &Path) -> Result<Lengths, Strin
 fn write_repeated(
     once: &str,
     step_s: f64,
-    repeats: usize,
+    repeats: u32,
     mut out: impl std::io::Write,
 ) -> std::io::Result<()> {
     let (header, rows) = once.split_once('\n').unwrap_or((once, ""));

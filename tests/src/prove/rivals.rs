@@ -19,7 +19,7 @@ use super::plan::{Group, Plan};
 use super::run::{key_of_case, write_case};
 use super::score::ratio;
 use super::summary::{median, quantile};
-use super::tool::{Tool, errors, measured};
+use super::tool::{LIMIT, Tool, errors, measured};
 
 /// Samples of the held-out outputs that a rival may see: its initial state. A replay is compared from the 300th on.
 const INITIAL_SAMPLES: usize = 100;
@@ -215,7 +215,7 @@ impl Rivals {
         let mut command = Command::new(&self.python);
         command.arg(self.scripts.join(rival.id).with_extension("py")).arg(".");
         command.envs(ONE_THREAD.map(|name| (name, "1"))).env("PYTHONDONTWRITEBYTECODE", "1");
-        let cost = measured(&mut command, seen, rival.id, &[0])?;
+        let cost = measured(&mut command, seen, rival.id, &[0], LIMIT)?;
         let remarks = prediction.with_extension("json");
         let text = fs::read_to_string(&remarks).map_err(|error| format!("{}: {error}", remarks.display()))?;
         let remarks =

@@ -12,8 +12,8 @@ use wait4::Wait4;
 
 use super::outcome::{Cost, Errors};
 
-/// A program that takes longer is ended.
-const LIMIT: Duration = Duration::from_mins(10);
+/// A program that takes longer over one recording is ended.
+pub const LIMIT: Duration = Duration::from_mins(10);
 
 /// How often a running program is asked whether it is done.
 const POLL: Duration = Duration::from_millis(10);
@@ -33,6 +33,7 @@ pub struct Tool {
     path: PathBuf,
     threads: usize,
     hash: u64,
+    limit: Duration,
 }
 
 impl Tool {
@@ -55,7 +56,13 @@ impl Tool {
             }
             hasher.write(&piece[..length]);
         }
-        Ok(Self { path: path.to_owned(), threads, hash: hasher.finish() })
+        Ok(Self { path: path.to_owned(), threads, hash: hasher.finish(), limit: LIMIT })
+    }
+
+    /// The same, given so many times as long.
+    #[must_use]
+    pub fn patient(&self, times: u32) -> Self {
+        Self { limit: LIMIT * times, ..self.clone() }
     }
 
     /// Hash of the binary's bytes.
@@ -117,16 +124,22 @@ impl Tool {
         let mut command = Command::new(&self.path);
         command.args(arguments).arg("--quiet").arg("--jobs").arg(self.threads.to_string());
         // 3: done, but something was lost or repaired.
-        measured(&mut command, folder, &format!("bowden {}", arguments[0]), &[0, 3])
+        measured(&mut command, folder, &format!("bowden {}", arguments[0]), &[0, 3], self.limit)
     }
 }
 
 /// Runs a program in `folder` to its end and measures what it used; what it says goes to `stderr.txt`.
 ///
 /// # Errors
-/// When it cannot be started, takes too long, or does not end with one of the accepted exit statuses; the reason is its
+/// When it cannot be started, takes longer than `limit`, or does not end with one of the accepted exit statuses; the reason is its
 /// last line.
-pub fn measured(command: &mut Command, folder: &Path, what: &str, accepted: &[i32]) -> Result<Cost, String> {
+pub fn measured(
+    command: &mut Command,
+    folder: &Path,
+    what: &str,
+    accepted: &[i32],
+    limit: Duration,
+) -> Result<Cost, String> {
     let said = folder.join("stderr.txt");
     let stderr = File::create(&said).map_err(|error| format!("{}: {error}", said.display()))?;
     command.current_dir(folder);
@@ -139,11 +152,11 @@ pub fn measured(command: &mut Command, folder: &Path, what: &str, accepted: &[i3
         if let Some(used) = child.try_wait4().map_err(|error| format!("{what}: {error}"))? {
             break used;
         }
-        if started.elapsed() > LIMIT {
+        if started.elapsed() > limit {
             // Either it still runs and is ended here, or it has just ended by itself.
             let _ = child.kill();
             let _ = child.wait();
-            return Err(format!("{what} was not done after {} s", LIMIT.as_secs()));
+            return Err(format!("{what} was not done after {} s", limit.as_secs()));
         }
         thread::sleep(POLL);
     };
@@ -208,6 +221,17 @@ mod tests {
     use super::*;
     use std::fmt::Write as _;
     use virtual_bench::{BenchConfig, Motion, MotionKind, record};
+
+    #[cfg(unix)]
+    #[test]
+    fn a_program_is_ended_at_its_limit_which_longer_recordings_move() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut sleep = Command::new("sleep");
+        let ended = measured(sleep.arg("600"), folder.path(), "sleep", &[0], Duration::from_millis(50));
+        assert_eq!(ended.unwrap_err(), "sleep was not done after 0 s");
+        let tool = Tool { path: "bowden".into(), threads: 1, hash: 0, limit: LIMIT };
+        assert_eq!(tool.patient(90).limit, Duration::from_hours(15), "ninety times ten minutes");
+    }
 
     #[test]
     fn a_prediction_half_a_newton_off_has_that_error_after_settling() {
