@@ -31,8 +31,12 @@ pub struct CompensatorInput {
     pub theta_d: Angle,
     /// Desired speed of the joint.
     pub omega_d: Speed,
-    /// Measured output torque `(F2 - F4) r2`.
+    /// Output torque `(F2 - F4) r2`, measured or estimated.
     pub torque_out: Torque,
+    /// Half of the dead zone at the input pulley, `F0 L tanh(mu K/2)/(EA r1)`.
+    pub friction: Angle,
+    /// The cables slip in the direction of the present travel.
+    pub slips: bool,
     /// Measured angle of the input pulley.
     pub theta_in: Angle,
     /// Measured angle of the joint.
@@ -56,6 +60,8 @@ pub struct CompensatorState {
     target: Sum<Angle>,
     theta_f: Angle,
     torque: Sum<Torque>,
+    /// The reference moved towards -theta when it moved last.
+    backward: bool,
 }
 
 impl CompensatorState {
@@ -63,7 +69,7 @@ impl CompensatorState {
     #[must_use]
     pub fn starting_at(config: &Compensator, input: &CompensatorInput) -> Self {
         let lag = input.theta_in.minus(config.at_input(input.theta_out)).limited(config.size_limit);
-        Self { target: Sum::at(lag), theta_f: lag, torque: Sum::at(input.torque_out) }
+        Self { target: Sum::at(lag), theta_f: lag, torque: Sum::at(input.torque_out), backward: false }
     }
 }
 
@@ -84,19 +90,33 @@ pub fn compensate(
     match config.source {
         Source::Off => state.target = Sum::at(Angle::ZERO),
         Source::Torque if forward => {
-            state.target = Sum::at(config.stretch.apply(torque).plus(config.friction));
+            state.target = Sum::at(config.stretch.apply(torque).plus(input.friction));
         }
         Source::Torque if backward => {
-            state.target = Sum::at(config.stretch.apply(torque).minus(config.friction));
+            state.target = Sum::at(config.stretch.apply(torque).minus(input.friction));
         }
         Source::Encoders if forward || backward => {
             let lag = input.theta_in.minus(config.at_input(input.theta_out));
             // Limited ahead of the sum, so that the sum never has to come back from afar.
             state.target.approach(config.follow, lag.limited(config.size_limit));
         }
+        Source::Adaptive => {
+            if forward || backward {
+                state.backward = backward;
+            }
+            // What the lag has beyond friction, stretch under the load, changes with the load and not at a turn.
+            if input.slips && (forward || backward) {
+                let lag = input.theta_in.minus(config.at_input(input.theta_out));
+                let stretch = lag.limited(config.size_limit).minus(signed(input.friction, backward));
+                state.target.approach(config.follow, stretch);
+            }
+        }
         Source::Torque | Source::Encoders => {}
     }
-    let wanted = state.target.value();
+    let wanted = match config.source {
+        Source::Adaptive => state.target.value().plus(signed(input.friction, state.backward)),
+        Source::Off | Source::Torque | Source::Encoders => state.target.value(),
+    };
     let target = wanted.limited(config.size_limit);
     let step = target.minus(state.theta_f).limited(config.step_limit);
     state.theta_f = state.theta_f.plus(step);
@@ -106,4 +126,9 @@ pub fn compensate(
         theta_f: state.theta_f,
         limited,
     }
+}
+
+#[inline]
+fn signed(friction: Angle, backward: bool) -> Angle {
+    if backward { friction.negated() } else { friction }
 }

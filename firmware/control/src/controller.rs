@@ -13,6 +13,7 @@ use crate::encoder::stuck::StuckWatch;
 use crate::observer::{Motion, Observer};
 use crate::reference::{Origin, ReferenceConfig, ReferenceOutput, ReferenceState};
 use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
+use crate::sheath::{Fitted, SheathEstimate, SheathInput, SheathObserver};
 use crate::supervisor::{Detection, Situation, Supervisor};
 use crate::supply::Supply;
 use crate::tension::TensionChannels;
@@ -28,6 +29,7 @@ pub struct Controller {
     tensions: TensionChannels,
     supply: Supply,
     observer: Observer,
+    sheaths: SheathObserver,
     reference: ReferenceState,
     /// Reference that was set with the bridge off.
     waiting: Option<ReferenceConfig>,
@@ -35,6 +37,7 @@ pub struct Controller {
     starts: bool,
     compensator: CompensatorState,
     loops: Loops,
+    sheath: SheathEstimate,
     limits: Limits,
     ticks: u32,
 }
@@ -45,8 +48,11 @@ struct Readings {
     theta: [Angle; 2],
     motion: Motion,
     tensions: [Tension; 4],
-    torque_in: Torque,
-    torque_out: Torque,
+    /// Torque that the tendons take from the input pulley, for the position loop.
+    load: Torque,
+    /// The same where it is measured, else 0.
+    measured_load: Torque,
+    sheath: SheathEstimate,
     current: Current,
     bus: Voltage,
     found: Option<Detection>,
@@ -72,11 +78,13 @@ impl Controller {
             tensions: TensionChannels::default(),
             supply: Supply::default(),
             observer: Observer::default(),
+            sheaths: SheathObserver::default(),
             reference: ReferenceState::default(),
             waiting: None,
             starts: false,
             compensator: CompensatorState::default(),
             loops: Loops::default(),
+            sheath: SheathEstimate::default(),
             limits: Limits(0),
             ticks: 0,
         }
@@ -113,6 +121,7 @@ impl Controller {
             Action::default()
         };
         self.limits = limits;
+        self.sheath = readings.sheath;
         let sample = Sample {
             encoder_count_raw: readings.counts,
             tension_raw: input.tension_raw,
@@ -138,6 +147,7 @@ impl Controller {
                     if old != new && !driving {
                         *channel = EncoderChannel::default();
                         self.observer = Observer::default();
+                        self.sheaths = SheathObserver::default();
                     }
                 }
                 self.config.copy_from(config);
@@ -176,15 +186,28 @@ impl Controller {
         let torque_in = config.input_radius.apply(f1.minus(f3));
         let torque_out = config.output_radius.apply(f2.minus(f4));
         let supply = self.supply.observe(&config.supply, input.current_raw, input.bus_raw);
+        let motor_side = config.sheath.fitted != Fitted::Nothing;
+        let measured_load = if motor_side { torque_in } else { Torque::ZERO };
         let motion = self.observer.observe(
             &config.observer,
             theta[0],
             !observed[0].repaired,
             supply.current,
-            torque_in,
+            measured_load,
         );
         let checks = self.supervisor.tension_checks();
-        let tension = self.tensions.watch(&config.tension, checks, input.tension_raw, tensions);
+        let lag = theta[0].minus(config.compensator.at_input(theta[1]));
+        let tension = self.tensions.watch(&config.tension, checks, input.tension_raw, tensions, lag);
+        let measured = SheathInput {
+            tensions,
+            torque_in,
+            torque_out,
+            current: supply.current,
+            motion,
+            theta_out: theta[1],
+        };
+        let sheath = self.sheaths.observe(&config.sheath, &measured);
+        let load = if motor_side { torque_in } else { self.observer.load(&config.observer) };
         let found = if self.supervisor.watches() {
             let bridge =
                 input.bridge_fault.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
@@ -195,7 +218,7 @@ impl Controller {
             None
         };
         let (current, bus) = (supply.current, supply.bus_filtered);
-        Readings { counts, theta, motion, tensions, torque_in, torque_out, current, bus, found }
+        Readings { counts, theta, motion, tensions, load, measured_load, sheath, current, bus, found }
     }
 
     fn stand_still(&mut self, counts: [i32; 2]) -> Option<Detection> {
@@ -217,14 +240,17 @@ impl Controller {
         let torque_mode = self.supervisor.mode() == Mode::Torque;
         let mut compensation = CompensatorInput {
             theta_d: readings.theta[1],
-            torque_out: readings.torque_out,
+            torque_out: readings.sheath.torque_out,
+            friction: readings.sheath.friction_angle,
+            slips: readings.sheath.slips,
             theta_in: readings.theta[0],
             theta_out: readings.theta[1],
             ..CompensatorInput::default()
         };
         if self.starts {
             self.starts = false;
-            let here = if torque_mode { readings.torque_out.to_bits() } else { readings.theta[1].to_bits() };
+            let here =
+                if torque_mode { readings.sheath.torque_out.to_bits() } else { readings.theta[1].to_bits() };
             self.reference = ReferenceState::standing_at(here);
             if homing {
                 let origin = Origin::Hold(0);
@@ -257,7 +283,7 @@ impl Controller {
                 acceleration: reference.acceleration(config.rate_hz),
                 measured: readings.theta[0],
                 motion: readings.motion,
-                torque_in: readings.torque_in,
+                torque_in: readings.load,
             };
             (self.loops.position(&config.position, &config.drive, &position, limits), compensated.theta_c)
         };
@@ -283,7 +309,9 @@ impl Controller {
         let input = TorqueInput {
             wanted,
             rate_sign: reference.change.signum() as i32,
-            measured: readings.torque_out,
+            measured: readings.sheath.torque_out,
+            torque_in: readings.measured_load,
+            friction: readings.sheath.friction_torque,
             speed: readings.motion.speed,
         };
         loops.torque(&config.torque, &config.drive, &input, limits)
@@ -305,6 +333,12 @@ impl Controller {
     #[must_use]
     pub const fn limits(&self) -> Limits {
         self.limits
+    }
+
+    /// What the last tick knew of the sheaths.
+    #[must_use]
+    pub const fn sheath(&self) -> SheathEstimate {
+        self.sheath
     }
 
     /// Ticks done since boot.

@@ -9,7 +9,7 @@
 //! | loop | law |
 //! |---|---|
 //! | position | `τ = J (k_p e + k_i ∫e dt + k_d (ω_c − ω) + α_c) + b ω + g (F1 − F3) r1`, `e = θ_c − θ`; `k_p = ω_n²`, `k_d = 2ζω_n`, `k_i = k_p/T_i` |
-//! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + k (e + ∫e dt/T_i) − d ω`, `e = (r1/r2)(T_d − T_out)`, s the low-passed sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) |
+//! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + k (e + ∫e dt/T_i) − d ω`, `e = (r1/r2)(T_d − T_out)`, s the sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) with the `mu K` of [`crate::sheath`]; `g M s` is low-passed |
 //!
 //! The measured input torque is fed forward, so the position loop sees the rotor alone, whatever weight and friction do.
 //! The integral rests (flag [`Limit::Integrator`]) while current or duty are at their limit and the error would push
@@ -71,9 +71,13 @@ pub struct TorqueConfig {
     pub integral: Weight<Torque, Torque>,
     /// `d`.
     pub damping: Gain<Speed, Torque>,
-    /// `g M`.
-    pub friction: Torque,
-    /// Low-pass of its sign.
+    /// Damping by the rate of the input torque: `d_T/T_f`, `T_f` the time of the low-pass.
+    pub lead: Gain<Torque, Torque>,
+    /// Low-pass of the input torque, its difference to which is the rate.
+    pub lead_filter: Weight<Torque, Torque>,
+    /// `g`: part of the friction that is fed forward.
+    pub friction: Gain<Torque, Torque>,
+    /// Low-pass of what is fed forward.
     pub friction_filter: Weight<Torque, Torque>,
 }
 
@@ -84,7 +88,10 @@ pub struct Loops {
     feedforward: Sum<Acceleration>,
     torque: Sum<Torque>,
     friction: Sum<Torque>,
-    friction_target: Torque,
+    /// Low-passed input torque.
+    slow: Sum<Torque>,
+    /// The reference fell when it moved last.
+    falls: bool,
     /// Sign of the output that was at a limit in the last tick, 0 if none was.
     saturated: i8,
 }
@@ -113,8 +120,12 @@ pub struct TorqueInput {
     pub wanted: Torque,
     /// Sign of its rate.
     pub rate_sign: i32,
-    /// Measured output torque `(F2 - F4) r2`.
+    /// Output torque `(F2 - F4) r2`, measured or estimated.
     pub measured: Torque,
+    /// Torque that the tendons take from the input pulley, where it is measured, else 0.
+    pub torque_in: Torque,
+    /// Friction torque of the sheaths at the joint, `M`.
+    pub friction: Torque,
     /// Observed speed of the input pulley.
     pub speed: Speed,
 }
@@ -166,13 +177,16 @@ impl Loops {
         input: &TorqueInput,
         limits: &mut Limits,
     ) -> Torque {
-        let TorqueInput { wanted, rate_sign, measured, speed } = *input;
+        let TorqueInput { wanted, rate_sign, measured, friction, speed, .. } = *input;
         match rate_sign {
-            1.. => self.friction_target = config.friction,
+            1.. => self.falls = false,
             0 => {}
-            _ => self.friction_target = config.friction.negated(),
+            _ => self.falls = true,
         }
-        let friction = self.friction.approach(config.friction_filter, self.friction_target);
+        let slow = self.slow.approach(config.lead_filter, input.torque_in);
+        let friction = config.friction.apply(friction);
+        let friction = if self.falls { friction.negated() } else { friction };
+        let friction = self.friction.approach(config.friction_filter, friction);
         let error = config.at_input.apply(wanted.minus(measured));
         if self.may_integrate(error.to_bits(), limits) {
             self.torque.add(config.integral, error);
@@ -184,6 +198,7 @@ impl Loops {
             .plus(self.torque.value())
             .plus(drive.viscous.apply(speed))
             .minus(config.damping.apply(speed))
+            .minus(config.lead.apply(input.torque_in.minus(slow)))
     }
 
     /// Duty that makes this torque, 1/32767, within all limits.

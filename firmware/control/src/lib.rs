@@ -8,6 +8,7 @@
 //! | [`encoder`], [`tension`], [`supply`] | sensors, and whether they can be believed |
 //! | [`mod@reference`] | where the joint is to be |
 //! | [`compensator`] | where the input pulley has to be for that |
+//! | [`sheath`] | how much friction the sheaths have at the moment |
 //! | [`observer`], [`drive`] | how the motor gets it there |
 //! | [`supervisor`] | states, and which fault counts in which |
 //! | [`parameters`] | everything that can be set, in SI units |
@@ -28,6 +29,7 @@ pub mod parameters;
 pub mod reference;
 pub mod scale;
 pub mod service;
+pub mod sheath;
 pub mod snapshot;
 pub mod supervisor;
 pub mod supply;

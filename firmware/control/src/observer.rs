@@ -28,6 +28,8 @@ pub struct ObserverConfig {
     pub follow: Weight<Angle, Angle>,
     /// `ω_o / 3` a tick: from the pull to what the model lacks.
     pub learn: Weight<Acceleration, Acceleration>,
+    /// `J`: acceleration that the model lacks to the torque that takes it.
+    pub inertia: Gain<Acceleration, Torque>,
     /// A tick's time: speed to angle.
     pub speed_step: Weight<Speed, Angle>,
     /// A tick's time: acceleration to speed.
@@ -81,6 +83,15 @@ impl Observer {
         angle_sum.add(config.speed_step, speed);
         angle_sum.add(config.follow, error);
         Motion { angle: angle_sum.value(), speed: self.speed.value() }
+    }
+}
+
+impl Observer {
+    /// Torque that something takes from the input pulley and that the model was not told of, `-J d`.
+    #[inline]
+    #[must_use]
+    pub fn load(&self, config: &ObserverConfig) -> Torque {
+        config.inertia.apply(self.lacking.value().negated())
     }
 }
 

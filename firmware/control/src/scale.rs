@@ -14,6 +14,7 @@
 //! | [`Current`] | A | ±2048 | 0.95e-6 |
 //! | [`Voltage`] | V | ±2048 | 0.95e-6 |
 //! | [`Code`] | ADC code | ±524 288 | 1/4096 |
+//! | [`Ratio`] | 1 | ±128 | 60e-9 |
 //!
 //! Sums and differences saturate. A [`Gain`] rounds to nearest (half up) and saturates; its factor is exactly the `f32`
 //! it was made from, so the error of a product is at most half a step of the result.
@@ -21,7 +22,7 @@
 use core::cmp::Ordering;
 use core::marker::PhantomData;
 
-use fixed::types::{I12F20, I20F12};
+use fixed::types::{I8F24, I12F20, I20F12};
 
 /// A fixed-point quantity with a unit.
 pub trait Quantity: Copy + Default + PartialOrd {
@@ -156,6 +157,44 @@ quantity!(Tension, I12F20, 20, "Tension, N, in 2⁻²⁰.");
 quantity!(Current, I12F20, 20, "Current, A, in 2⁻²⁰.");
 quantity!(Voltage, I12F20, 20, "Voltage, V, in 2⁻²⁰.");
 quantity!(Code, I20F12, 12, "Code of a converter, with fractions, in 2⁻¹².");
+quantity!(Ratio, I8F24, 24, "Number without a unit, in 2⁻²⁴.");
+
+impl Ratio {
+    /// 1.
+    pub const ONE: Self = Self::from_parts(1, 1);
+    /// 1/3.
+    pub const THIRD: Self = Self::from_parts(1, 3);
+    /// 1/5.
+    pub const FIFTH: Self = Self::from_parts(1, 5);
+
+    /// `numerator/denominator`, rounded towards 0; for constants.
+    #[must_use]
+    pub const fn from_parts(numerator: i32, denominator: i32) -> Self {
+        Self(I8F24::from_bits((numerator << 24) / denominator))
+    }
+
+    /// This part of `value`, rounded down, saturated.
+    #[must_use]
+    #[inline]
+    pub fn of<Q: Quantity>(self, value: Q) -> Q {
+        let product = i64::from(self.0.to_bits()) * i64::from(value.to_bits());
+        Q::from_bits(saturated(product >> 24))
+    }
+
+    /// Product, rounded down, saturated.
+    #[must_use]
+    #[inline]
+    pub fn times(self, other: Self) -> Self {
+        self.of(other)
+    }
+
+    /// Mean of two.
+    #[must_use]
+    #[inline]
+    pub const fn half_sum(self, other: Self) -> Self {
+        Self(I8F24::from_bits((self.0.to_bits() >> 1) + (other.0.to_bits() >> 1)))
+    }
+}
 
 /// Nearest `i32`.
 #[inline]
@@ -272,6 +311,15 @@ impl<I: Quantity, O: Quantity> Weight<I, O> {
         let exponent =
             SUM_BITS.cast_signed() + O::FRACTION_BITS.cast_signed() - I::FRACTION_BITS.cast_signed();
         Self { bits: libm::rintf(libm::scalbnf(factor, exponent)) as i32, from_to: PhantomData }
+    }
+
+    /// A weight between two quantities of one scale that the tick computes, -1/2 to 1/2.
+    #[inline]
+    pub(crate) fn of_ratio(ratio: Ratio) -> Self {
+        /// From 2⁻²⁴ to 2⁻³¹.
+        const EXTRA_BITS: u32 = SUM_BITS - Ratio::FRACTION_BITS;
+        const { assert!(I::FRACTION_BITS == O::FRACTION_BITS) };
+        Self { bits: ratio.limited(Ratio::from_parts(1, 2)).to_bits() << EXTRA_BITS, from_to: PhantomData }
     }
 
     /// The weight of a first-order low-pass that reaches 63 % in `time_s` at `period_s` a tick: `T / (τ + T)`.

@@ -11,7 +11,7 @@
 //! | encoder frames, jumps | | x | x | x | x | x |
 //! | encoder stuck | | | | | x | x |
 //! | tension at a rail | | x | x | x | x | x |
-//! | slack, over-tension, inconsistent tensions | | | | x | x | x |
+//! | slack, over-tension, tensions that contradict each other or the stretch | | | | x | x | x |
 //! | over-current, bus voltage, bridge | | x | x | x | x | x |
 //! | self test timeout | | x | | | | |
 //! | pretension off | | | x | | | |
@@ -27,6 +27,7 @@ use bowden_link::message::{Goal, Mode};
 use bowden_link::{Fault, FaultRecord, State};
 
 use crate::scale::{Angle, Current, Tension};
+use crate::sheath::Fitted;
 use crate::tension::TensionChecks;
 
 /// Whether a goal can be asked for in this state.
@@ -77,6 +78,8 @@ pub struct SupervisorConfig {
     pub self_test_ticks: u32,
     /// Largest variance of a tension at rest, codes², in 2⁻⁸.
     pub noise_limit: [u32; 4],
+    /// Which tensions are measured.
+    pub fitted: Fitted,
     /// Largest mean current with the bridge off.
     pub rest_current: Current,
     /// Pretension.

@@ -2,7 +2,8 @@
 
 use bowden_link::Fault;
 
-use crate::scale::{Code, Debounce, Gain, Quantity, Sum, Tension, Weight};
+use crate::scale::{Angle, Code, Debounce, Gain, Quantity, Sum, Tension, Weight};
+use crate::sheath::Fitted;
 use crate::supervisor::Detection;
 
 /// Volts a code of the 12-bit converters at 3.3 V reference.
@@ -25,7 +26,17 @@ pub struct TensionConfig {
     pub debounce_ticks: u16,
     /// Low-pass ahead of the comparison of both ends.
     pub filter: Weight<Tension, Tension>,
-    /// Largest ratio of the tensions at both ends, `e^(mu K + margin)`.
+    /// Which channels are there.
+    pub fitted: Fitted,
+    /// Pretension F0.
+    pub pretension: Tension,
+    /// `2 EA r1/L`: twice the tension that a lag at the input pulley gives a cable.
+    pub stretch: Gain<Angle, Tension>,
+    /// How far the sum of both ends may be from the one that the stretch tells.
+    pub stretch_margin: Tension,
+    /// Ticks for which they have to disagree, at least 1: longer than an encoder that stands needs to be found.
+    pub stretch_ticks: u16,
+    /// Largest ratio of the tensions at both ends, `e^(mu K + margin)` of the largest `mu K` that a sheath may have.
     pub ratio: Gain<Tension, Tension>,
     /// Margin beyond that ratio.
     pub margin: Tension,
@@ -49,6 +60,7 @@ pub struct TensionChannels {
     slack: [Debounce; 4],
     over: [Debounce; 4],
     inconsistent: [Debounce; 2],
+    unlike_stretch: [Debounce; 2],
     filtered: Option<[Sum<Tension>; 4]>,
 }
 
@@ -71,27 +83,35 @@ impl TensionChannels {
     /// Watches this tick's codes and tensions; returns the first fault.
     ///
     /// Both ends of a cable fit its friction while `f2 ≤ e^(mu K + margin)·f1 + margin` and the same with f1 and f2 changed
-    /// over, whatever the cable does: that is `|ln(f2/f1)| ≤ mu K` of Eq. (2)-(3) with margins, without a division.
+    /// over, whatever the cable does: that is `|ln(f2/f1)| ≤ mu K` of Eq. (2)-(3) with margins, without a division. `mu K` is
+    /// the largest that a sheath may have, so this check follows a sheath wherever it is moved. What it no longer sees, a
+    /// channel that drifts, stands still or belongs to another cable, contradicts the stretch: `f1 + f2 = 2 F0 + 2 EA r1 lag/L`
+    /// and `f3 + f4` with the other sign, from Eq. (6)-(9), within [`TensionConfig::stretch_margin`]. `lag` is
+    /// `theta_in - (r2/r1) theta_out`. Where only f1 and f3 are there, the stretch stands for the other end.
     pub fn watch(
         &mut self,
         config: &TensionConfig,
         checks: TensionChecks,
         codes_raw: [u16; 4],
         tensions: [Tension; 4],
+        lag: Angle,
     ) -> Option<Detection> {
         let [low, high] = config.rail_raw;
         let at_rail = |code_raw: u16| code_raw < low || code_raw > high;
         let off = |tension: Tension| tension < config.slack || tension > config.over;
-        let any_wrong = codes_raw.into_iter().any(at_rail) || tensions.into_iter().any(off);
-        let found = if any_wrong {
-            let channels = [0, 1, 2, 3].map(|n| self.channel(config, checks, n, codes_raw[n], tensions[n]));
+        let wrong = |n: usize| config.fitted.has(n) && (at_rail(codes_raw[n]) || off(tensions[n]));
+        let found = if [0, 1, 2, 3].into_iter().any(wrong) {
+            let channels = [0, 1, 2, 3].map(|n| {
+                let there = config.fitted.has(n);
+                there.then(|| self.channel(config, checks, n, codes_raw[n], tensions[n])).flatten()
+            });
             channels.into_iter().flatten().next()
         } else {
             // Nearly always.
             (self.rail, self.slack, self.over) = Default::default();
             None
         };
-        let inconsistent = self.compare(config, tensions);
+        let inconsistent = self.compare(config, tensions, lag);
         found.or(inconsistent.filter(|_| checks.load))
     }
 
@@ -122,18 +142,35 @@ impl TensionChannels {
         }
     }
 
-    fn compare(&mut self, config: &TensionConfig, tensions: [Tension; 4]) -> Option<Detection> {
+    fn compare(&mut self, config: &TensionConfig, tensions: [Tension; 4], lag: Angle) -> Option<Detection> {
+        if config.fitted == Fitted::Nothing {
+            return None;
+        }
         let sums = self.filtered.get_or_insert_with(|| tensions.map(Sum::at));
         let filtered: [Tension; 4] = core::array::from_fn(|n| sums[n].approach(config.filter, tensions[n]));
+        let twice_stretch = config.stretch.apply(lag);
+        let twice_rest = config.pretension.plus(config.pretension);
         let mut found = None;
         for cable in [0, 1] {
-            let (input, output) = (filtered[2 * cable], filtered[2 * cable + 1]);
+            let from_stretch =
+                if cable == 0 { twice_rest.plus(twice_stretch) } else { twice_rest.minus(twice_stretch) };
+            let input = filtered[2 * cable];
+            let output = match config.fitted {
+                Fitted::All => filtered[2 * cable + 1],
+                Fitted::Input | Fitted::Nothing => from_stretch.minus(input),
+            };
             let (less, more) = if input < output { (input, output) } else { (output, input) };
             let allowed = config.ratio.apply(less).plus(config.margin);
+            let apart = input.plus(output).minus(from_stretch).magnitude();
             let wrong = self.inconsistent[cable].count(more > allowed, config.consistency_ticks);
-            if wrong && found.is_none() {
+            let unlike =
+                self.unlike_stretch[cable].count(apart > config.stretch_margin, config.stretch_ticks);
+            if found.is_none() && wrong {
                 found =
                     Some(Detection::new(Fault::TensionInconsistent, cable, more.to_f32(), allowed.to_f32()));
+            } else if found.is_none() && unlike {
+                let (got, limit) = (apart.to_f32(), config.stretch_margin.to_f32());
+                found = Some(Detection::new(Fault::StretchInconsistent, cable, got, limit));
             }
         }
         found

@@ -138,6 +138,7 @@ fn errors_against_f64() {
                 theta_d: Angle::from_f32(random.between(-2.0, 2.0) as f32),
                 omega_d: Speed::from_f32((direction * random.between(0.01, 3.0)) as f32),
                 torque_out: Torque::from_f32(random.between(-0.5, 0.5) as f32),
+                friction: Angle::from_f32(LagAngles::new(&parameters).friction_rad),
                 ..CompensatorInput::default()
             };
             let mut state = CompensatorState::default();
@@ -184,6 +185,8 @@ fn encoder_source_settles_at_the_measured_lag() {
             theta_d: Angle::from_f32(theta_out as f32),
             omega_d: Speed::from_f32(0.5),
             torque_out: Torque::ZERO,
+            friction: Angle::ZERO,
+            slips: true,
             theta_in: Angle::from_f32((ratio * theta_out + random.between(-0.1, 0.1)) as f32),
             theta_out: Angle::from_f32(theta_out as f32),
         };
@@ -228,6 +231,7 @@ fn a_run_stays_with_its_f64_twin() {
             theta_d: Angle::from_f32((0.5 * phase.sin()) as f32),
             omega_d: Speed::from_f32(omega as f32),
             torque_out: Torque::from_f32((0.6 * phase.sin() + random.between(-0.01, 0.01)) as f32),
+            friction: Angle::from_f32(LagAngles::new(&parameters).friction_rad),
             ..CompensatorInput::default()
         };
         let got = compensate(&config, &mut state, &input);
@@ -238,6 +242,7 @@ fn a_run_stays_with_its_f64_twin() {
                 theta_d_rad: input.theta_d.to_f32(),
                 omega_d_rad_s: input.omega_d.to_f32(),
                 torque_out_nm: input.torque_out.to_f32(),
+                friction_rad: input.friction.to_f32(),
                 ..FloatInput::default()
             },
         );
@@ -284,6 +289,8 @@ fn extremes_saturate() {
                         theta_d: Angle::from_bits(theta),
                         omega_d: Speed::from_bits(omega),
                         torque_out: Torque::from_bits(torque),
+                        friction: Angle::from_bits(omega),
+                        slips: omega > 0,
                         theta_in: Angle::from_bits(torque),
                         theta_out: Angle::from_bits(theta),
                     };

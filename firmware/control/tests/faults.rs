@@ -204,14 +204,40 @@ fn an_encoder_that_stands_is_found() {
 
 #[test]
 fn tensions_that_do_not_fit_the_friction_are_found() {
-    // f1 reads 75 N. f2 is 30 N or less there, and e^(0.377 + 0.15)·30 + 4 = 54.8 N is allowed.
+    // f1 reads 5 N. f2 is 30 N, and e^(1.2 + 0.15)·5 + 4 = 23.3 N is allowed, whatever the sheath does.
     let mut bench = Bench::ready(Parameters::default(), joint());
-    bench.disturbance = Some(|input| input.tension_raw[0] = 2761);
+    bench.disturbance = Some(|input| input.tension_raw[0] = 763);
     let (ticks, record) = trip(&mut bench, 2000);
     assert_eq!((record.fault, record.channel), (Fault::TensionInconsistent, 0));
-    // 50 ms, and what the low-pass of 5 ms needs from 30 N to 55 N: 5 ms ln(45/20) = 4 ms.
-    assert!((500..=560).contains(&ticks), "{ticks} ticks");
-    assert!(record.got > record.limit && (50.0..58.0).contains(&record.limit), "{record}");
+    // 50 ms, and what the low-pass of 5 ms needs from 30 N down to 6.75 N: 5 ms ln(25/1.75) = 13 ms.
+    assert!((600..=660).contains(&ticks), "{ticks} ticks");
+    assert!(record.got > record.limit && (22.0..31.0).contains(&record.limit), "{record}");
+}
+
+#[test]
+fn tensions_that_contradict_the_stretch_are_found() {
+    // f1 reads 24 N too much: both ends of cable a are 84 N, at rest 60 N, and 20 N apart are allowed.
+    let mut bench = Bench::ready(Parameters::default(), joint());
+    bench.disturbance = Some(|input| input.tension_raw[0] += 685);
+    let (ticks, record) = trip(&mut bench, 5000);
+    assert_eq!((record.fault, record.channel), (Fault::StretchInconsistent, 0));
+    // 6 times 50 ms, and what the low-pass of 5 ms needs to 20 of 24 N: 5 ms ln(24/4) = 9 ms.
+    assert!((3050..=3150).contains(&ticks), "{ticks} ticks");
+    assert!((23.0..25.0).contains(&record.got) && record.limit == 20.0, "{record}");
+}
+
+/// Channels that belong to other places than the parameters say: found while the joint turns, before it has turned far.
+#[test]
+fn swapped_tension_channels_are_found() {
+    let swaps: [bench::Disturbance; 2] =
+        [|input| input.tension_raw.swap(0, 2), |input| input.tension_raw.swap(1, 3)];
+    for swap in swaps {
+        let mut bench = setting_out();
+        bench.disturbance = Some(swap);
+        let (_, record) = trip(&mut bench, 20_000);
+        assert!(matches!(record.fault, Fault::StretchInconsistent | Fault::TensionInconsistent), "{record}");
+        assert!(bench.plant.theta_out_rad().abs() < 0.7, "{} rad", bench.plant.theta_out_rad());
+    }
 }
 
 #[test]

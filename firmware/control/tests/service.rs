@@ -76,7 +76,7 @@ fn index_of(name: &str) -> u16 {
 fn the_greeting_says_who_is_there() {
     let reply = asked(&mut service(), &mut tick_in(State::Off), 1, ToBoard::Hello);
     let Reply::Say(FromBoard::Greeting(greeting)) = reply else { panic!("{reply:?}") };
-    assert_eq!((greeting.protocol_version, greeting.parameters), (PROTOCOL_VERSION, 85));
+    assert_eq!((greeting.protocol_version, greeting.parameters), (PROTOCOL_VERSION, Parameters::COUNT));
     assert_eq!((greeting.schema, greeting.board.as_str()), (bowden_link::SCHEMA, "test"));
 }
 

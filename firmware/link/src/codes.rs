@@ -119,6 +119,7 @@ faults! {
     11 Slack "N" "a tendon is slack" "restore the pretension";
     12 OverTension "N" "a tendon is pulled beyond its limit" "look for a blocked joint, or lower the reference";
     13 TensionInconsistent "N" "tensions at the two ends of a sheath do not fit its friction" "check gain and zero of the tension channels, and the sheath parameters";
+    14 StretchInconsistent "N" "the tensions of a cable do not fit its stretch, which both encoders tell" "check gain, zero and order of the tension channels, the encoders' zeros, and the pretension";
     20 OverCurrent "A" "motor current is beyond its limit" "look for a short circuit or a blocked motor";
     21 BusUnderVoltage "V" "bus voltage is too low" "check the supply";
     22 BusOverVoltage "V" "bus voltage is too high" "check the supply; braking may feed energy back";
@@ -161,8 +162,8 @@ impl FaultRecord {
             (10..=12 | 41, 1) => "f2",
             (10..=12 | 41, 2) => "f3",
             (10..=12 | 41, _) => "f4",
-            (13, 0) => "cable a",
-            (13, _) => "cable b",
+            (13 | 14, 0) => "cable a",
+            (13 | 14, _) => "cable b",
             _ => "",
         }
     }

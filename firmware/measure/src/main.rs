@@ -183,6 +183,8 @@ impl Bench {
                 theta_d: Angle::from_bits(small()),
                 omega_d: Speed::from_bits(small()),
                 torque_out: Torque::from_bits(small()),
+                friction: Angle::from_bits(small()),
+                slips: small() > 0,
                 theta_in: Angle::from_bits(small()),
                 theta_out: Angle::from_bits(small()),
             };
@@ -190,6 +192,8 @@ impl Bench {
                 theta_d_rad: input.theta_d.to_f32(),
                 omega_d_rad_s: input.omega_d.to_f32(),
                 torque_out_nm: input.torque_out.to_f32(),
+                friction_rad: input.friction.to_f32(),
+                slips: input.slips,
                 theta_in_rad: input.theta_in.to_f32(),
                 theta_out_rad: input.theta_out.to_f32(),
             };

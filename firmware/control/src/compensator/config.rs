@@ -13,6 +13,8 @@ pub enum Source {
     Torque,
     /// Eq. (22) with both encoders.
     Encoders,
+    /// Both encoders for the stretch, friction as [`crate::sheath`] follows it.
+    Adaptive,
 }
 
 /// Angles a torque and a direction make, in SI units: Eq. (20) from the output torque, times r2/r1 for the input pulley.
@@ -52,7 +54,6 @@ pub struct Compensator {
     pub(super) source: Source,
     pub(super) ratio: Gain<Angle, Angle>,
     pub(super) stretch: Gain<Torque, Angle>,
-    pub(super) friction: Angle,
     pub(super) threshold: Speed,
     pub(super) step_limit: Angle,
     pub(super) size_limit: Angle,
@@ -70,13 +71,13 @@ impl Compensator {
         let source = match compensation.source as i32 {
             1 => Source::Torque,
             2 => Source::Encoders,
+            3 => Source::Adaptive,
             _ => Source::Off,
         };
         Some(Self {
             source,
             ratio: Gain::new(angles.ratio)?,
             stretch: Gain::new(angles.stretch_rad_per_nm)?,
-            friction: Angle::from_f32(angles.friction_rad),
             threshold: Speed::from_f32(compensation.speed_threshold),
             step_limit: Angle::from_f32(compensation.rate_limit * period_s).max(Angle::from_bits(1)),
             size_limit: Angle::from_f32(compensation.size_limit),

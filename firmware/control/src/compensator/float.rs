@@ -24,6 +24,10 @@ pub struct FloatInput {
     pub omega_d_rad_s: f32,
     /// Measured output torque, N·m.
     pub torque_out_nm: f32,
+    /// Half of the dead zone at the input pulley, rad.
+    pub friction_rad: f32,
+    /// The cables slip in the direction of the present travel.
+    pub slips: bool,
     /// Measured angle of the input pulley, rad.
     pub theta_in_rad: f32,
     /// Measured angle of the joint, rad.
@@ -36,6 +40,7 @@ pub struct FloatState {
     target_rad: f32,
     theta_f_rad: f32,
     torque_nm: f32,
+    backward: bool,
 }
 
 impl FloatCompensator {
@@ -48,6 +53,7 @@ impl FloatCompensator {
             source: match compensation.source as i32 {
                 1 => Source::Torque,
                 2 => Source::Encoders,
+                3 => Source::Adaptive,
                 _ => Source::Off,
             },
             angles: LagAngles::new(parameters),
@@ -70,16 +76,32 @@ pub fn compensate_float(config: &FloatCompensator, state: &mut FloatState, input
     let stretch_rad = config.angles.stretch_rad_per_nm * state.torque_nm;
     match config.source {
         Source::Off => state.target_rad = 0.0,
-        Source::Torque if forward => state.target_rad = stretch_rad + config.angles.friction_rad,
-        Source::Torque if backward => state.target_rad = stretch_rad - config.angles.friction_rad,
+        Source::Torque if forward => state.target_rad = stretch_rad + input.friction_rad,
+        Source::Torque if backward => state.target_rad = stretch_rad - input.friction_rad,
         Source::Encoders if forward || backward => {
             let lag_rad = input.theta_in_rad - config.angles.ratio * input.theta_out_rad;
             let lag_rad = within(lag_rad, config.size_limit_rad);
             state.target_rad += config.follow_weight * (lag_rad - state.target_rad);
         }
+        Source::Adaptive => {
+            if forward || backward {
+                state.backward = backward;
+            }
+            if input.slips && (forward || backward) {
+                let lag_rad = input.theta_in_rad - config.angles.ratio * input.theta_out_rad;
+                let friction_rad = if backward { -input.friction_rad } else { input.friction_rad };
+                let stretch_rad = within(lag_rad, config.size_limit_rad) - friction_rad;
+                state.target_rad += config.follow_weight * (stretch_rad - state.target_rad);
+            }
+        }
         Source::Torque | Source::Encoders => {}
     }
-    let target_rad = within(state.target_rad, config.size_limit_rad);
+    let wanted_rad = match config.source {
+        Source::Adaptive if state.backward => state.target_rad - input.friction_rad,
+        Source::Adaptive => state.target_rad + input.friction_rad,
+        Source::Off | Source::Torque | Source::Encoders => state.target_rad,
+    };
+    let target_rad = within(wanted_rad, config.size_limit_rad);
     state.theta_f_rad += within(target_rad - state.theta_f_rad, config.step_limit_rad);
     config.angles.ratio * input.theta_d_rad + state.theta_f_rad
 }

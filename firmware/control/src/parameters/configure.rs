@@ -14,7 +14,8 @@ use crate::encoder::stuck::StuckConfig;
 use crate::encoder::{CountRaw, EncoderConfig};
 use crate::observer::ObserverConfig;
 use crate::reference::{Origin, ReferenceBounds};
-use crate::scale::{Angle, Code, Current, Gain, Quantity, Speed, Tension, Torque, Voltage, Weight};
+use crate::scale::{Angle, Code, Current, Gain, Quantity, Ratio, Speed, Tension, Torque, Voltage, Weight};
+use crate::sheath::{Fitted, SheathConfig};
 use crate::supervisor::SupervisorConfig;
 use crate::supply::SupplyConfig;
 use crate::tension::{TensionConfig, V_PER_CODE};
@@ -33,6 +34,7 @@ pub struct TickConfig {
     pub(crate) input_radius: Gain<Tension, Torque>,
     pub(crate) output_radius: Gain<Tension, Torque>,
     pub(crate) observer: ObserverConfig,
+    pub(crate) sheath: SheathConfig,
     pub(crate) compensator: Compensator,
     pub(crate) speed_ratio: Gain<Speed, Speed>,
     pub(crate) position: PositionConfig,
@@ -58,6 +60,7 @@ impl TickConfig {
             input_radius,
             output_radius,
             observer,
+            sheath,
             compensator,
             speed_ratio,
             position,
@@ -77,6 +80,7 @@ impl TickConfig {
         self.input_radius = *input_radius;
         self.output_radius = *output_radius;
         self.observer = *observer;
+        self.sheath = *sheath;
         self.compensator = *compensator;
         self.speed_ratio = *speed_ratio;
         self.position = *position;
@@ -125,6 +129,7 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         input_radius: gain(parameters.pulley.input_radius, "pulley.input_radius")?,
         output_radius: gain(parameters.pulley.output_radius, "pulley.output_radius")?,
         observer: observer(parameters, period_s)?,
+        sheath: sheath(parameters, period_s)?,
         compensator: Compensator::new(parameters).ok_or_else(|| conflict("tendon.axial_stiffness"))?,
         speed_ratio: gain(ratio, "pulley.output_radius")?,
         position: position(parameters, period_s)?,
@@ -227,10 +232,16 @@ fn capstan_ratio(exponent: f32) -> f32 {
 }
 
 fn tension(parameters: &Parameters, period_s: f32) -> Result<TensionConfig, Refusal> {
+    /// Time for which tensions may contradict the stretch, over the one for which they may contradict each other: an
+    /// encoder that stands is found first and named.
+    const STRETCH_TIMES: f32 = 6.0;
     let tension = &parameters.tension;
     let [f1, f2, f3, f4] = [&tension.f1, &tension.f2, &tension.f3, &tension.f4];
-    let exponent = parameters.sheath.friction_coefficient * parameters.sheath.wrap_angle;
-    let allowed = capstan_ratio(exponent + tension.exponent_margin);
+    let allowed = capstan_ratio(
+        friction_exponent(parameters).max(parameters.sheath.exponent_maximum) + tension.exponent_margin,
+    );
+    let tendon = &parameters.tendon;
+    let tension_per_lag = 2.0 * tendon.axial_stiffness * parameters.pulley.input_radius / tendon.length;
     Ok(TensionConfig {
         zero: [f1, f2, f3, f4].map(|channel| Code::from_f32(channel.zero)),
         gain: [
@@ -247,6 +258,11 @@ fn tension(parameters: &Parameters, period_s: f32) -> Result<TensionConfig, Refu
         ratio: gain(allowed, "sheath.wrap_angle")?,
         margin: Tension::from_f32(tension.margin),
         consistency_ticks: ticks(tension.consistency_time, period_s),
+        fitted: fitted(parameters),
+        pretension: Tension::from_f32(tendon.pretension),
+        stretch: gain(tension_per_lag, "tendon.axial_stiffness")?,
+        stretch_margin: Tension::from_f32(2.0 * tension.stretch_margin),
+        stretch_ticks: ticks(STRETCH_TIMES * tension.consistency_time, period_s),
     })
 }
 
@@ -286,9 +302,83 @@ fn observer(parameters: &Parameters, period_s: f32) -> Result<ObserverConfig, Re
         pull: gain(3.0 * bandwidth * bandwidth, "controller.observer_bandwidth")?,
         follow: Weight::new((3.0 * bandwidth * period_s).min(1.0)),
         learn: Weight::new(bandwidth / 3.0 * period_s),
+        inertia: gain(inertia, "motor.rotor_inertia")?,
         speed_step: Weight::new(period_s),
         acceleration_step: Weight::new(period_s),
         half_count: Angle::from_f32(0.5 * RAD_PER_COUNT),
+    })
+}
+
+/// `mu K` of the parameters.
+fn friction_exponent(parameters: &Parameters) -> f32 {
+    parameters.sheath.friction_coefficient * parameters.sheath.wrap_angle
+}
+
+fn fitted(parameters: &Parameters) -> Fitted {
+    match parameters.tension.fitted as i32 {
+        0 => Fitted::Nothing,
+        1 => Fitted::Input,
+        _ => Fitted::All,
+    }
+}
+
+fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusal> {
+    /// Travel for which a cable is sure to slip, over the dead zone.
+    const ZONE_MARGIN: f32 = 1.2;
+    /// Part of half a count of the joint's encoder within which an innovation says nothing. At 1 the estimate hangs at the
+    /// edge of what the count allows while friction changes, at 0 it follows each count.
+    const SILENT_PART: f32 = 0.6;
+    /// Time constant of the input torque, s: from tensions, whose noise is white, and from the current, which misses what
+    /// the rotor's inertia takes.
+    const TENSION_FILTER_S: f32 = 0.002;
+    const CURRENT_FILTER_S: f32 = 0.01;
+    /// Time for which a tick's error stays the same, s: one count of a joint that moves at 0.1 rad/s.
+    const COUNT_TIME_S: f32 = 0.015;
+    /// Variance of a tick's measurement where all tensions are measured: bristles and bends leave 2 %.
+    const TENSION_VARIANCE: f32 = 5e-4;
+    /// Time constant of the mean innovation, s.
+    const INNOVATION_TIME_S: f32 = 0.02;
+    /// Growth of the variance a second, per square of the mean innovation, where all tensions are measured: 0.02 doubles
+    /// the weight at the default rate. Where a count makes the innovations coarser it is less, as their square is more.
+    const MOVED_PER_S: f32 = 45.0;
+    /// Standard deviation of `mu K/2` from which on nothing is known.
+    const KNOWN: f32 = 0.08;
+    let (tendon, pulley) = (&parameters.tendon, &parameters.pulley);
+    let fitted = fitted(parameters);
+    let ratio = pulley.output_radius / pulley.input_radius;
+    let friction_nm = 4.0 * tendon.pretension * pulley.input_radius;
+    let stretch_nm = 4.0 * tendon.axial_stiffness * pulley.input_radius * pulley.input_radius / tendon.length;
+    let half_zone_rad = tendon.pretension * tendon.length / (tendon.axial_stiffness * pulley.input_radius);
+    let count_part = stretch_nm * RAD_PER_COUNT * ratio / friction_nm;
+    let variance = match fitted {
+        Fitted::All => TENSION_VARIANCE,
+        Fitted::Nothing | Fitted::Input => {
+            (count_part * count_part / 12.0 * COUNT_TIME_S / period_s).max(TENSION_VARIANCE)
+        }
+    };
+    let filter_s = if fitted == Fitted::Nothing { CURRENT_FILTER_S } else { TENSION_FILTER_S };
+    let rate = 0.5 * parameters.sheath.exponent_rate;
+    Ok(SheathConfig {
+        fitted,
+        adapts: parameters.sheath.adapts == 1.0,
+        nominal: Ratio::from_f32(libm::tanhf(0.5 * friction_exponent(parameters))),
+        friction: gain(friction_nm, "tendon.pretension")?,
+        per_friction: gain(1.0 / friction_nm, "tendon.pretension")?,
+        per_tension: gain(0.5 / tendon.pretension, "tendon.pretension")?,
+        stretch: gain(stretch_nm, "tendon.axial_stiffness")?,
+        zone: gain(ZONE_MARGIN * half_zone_rad, "tendon.axial_stiffness")?,
+        half_zone: gain(half_zone_rad, "tendon.axial_stiffness")?,
+        angle_ratio: gain(ratio, "pulley.output_radius")?,
+        torque_ratio: gain(ratio, "pulley.output_radius")?,
+        drive: gain(torque_constant(parameters), "motor.torque_constant")?,
+        viscous: gain(parameters.motor.viscous, "motor.viscous")?,
+        torque_filter: Weight::low_pass(filter_s, period_s),
+        silent: Angle::from_f32(0.5 * SILENT_PART * RAD_PER_COUNT * ratio),
+        process: Weight::new(rate * rate * period_s),
+        moved: Weight::new(MOVED_PER_S * TENSION_VARIANCE / variance * period_s),
+        innovation_filter: Weight::low_pass(INNOVATION_TIME_S, period_s),
+        per_noise: gain(1.0 / variance, "tendon.axial_stiffness")?,
+        known_below: Ratio::from_f32(KNOWN * KNOWN),
     })
 }
 
@@ -315,18 +405,29 @@ fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Re
 }
 
 fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusal> {
+    /// Low-pass whose difference to the input torque is its rate, s.
+    const LEAD_FILTER_S: f32 = 0.005;
     /// Time in which the friction that is fed forward changes sign, s.
     const FRICTION_FILTER_S: f32 = 0.02;
+    /// Part of the gain, and multiple of the damping, where the output torque is estimated: there the loop only helps the
+    /// input torque on its way, and what it overshoots is mistaken for friction.
+    const ESTIMATED_GAIN: f32 = 0.33;
+    const ESTIMATED_DAMPING: f32 = 3.0;
     let controller = &parameters.controller;
-    let exponent = parameters.sheath.friction_coefficient * parameters.sheath.wrap_angle;
-    let friction_nm = 2.0 * parameters.tendon.pretension * parameters.pulley.output_radius * exponent;
+    let (gain_part, damping_part) = match fitted(parameters) {
+        Fitted::All => (1.0, 1.0),
+        Fitted::Nothing | Fitted::Input => (ESTIMATED_GAIN, ESTIMATED_DAMPING),
+    };
+    let torque_gain = gain_part * controller.torque_gain;
     let at_input = parameters.pulley.input_radius / parameters.pulley.output_radius;
     Ok(TorqueConfig {
         at_input: gain(at_input, "pulley.input_radius")?,
-        proportional: gain(controller.torque_gain, "controller.torque_gain")?,
-        integral: Weight::new(controller.torque_gain / controller.torque_integral_time * period_s),
-        damping: gain(controller.torque_damping, "controller.torque_damping")?,
-        friction: Torque::from_f32(controller.friction_feedforward * friction_nm),
+        proportional: gain(torque_gain, "controller.torque_gain")?,
+        integral: Weight::new(torque_gain / controller.torque_integral_time * period_s),
+        damping: gain(damping_part * controller.torque_damping, "controller.torque_damping")?,
+        lead: gain(controller.tension_damping / LEAD_FILTER_S, "controller.tension_damping")?,
+        lead_filter: Weight::low_pass(LEAD_FILTER_S, period_s),
+        friction: gain(controller.friction_feedforward, "controller.friction_feedforward")?,
         friction_filter: Weight::low_pass(FRICTION_FILTER_S, period_s),
     })
 }
@@ -357,6 +458,7 @@ fn supervisor(parameters: &Parameters, period_s: f32) -> SupervisorConfig {
         self_test_ticks: long_ticks(supervisor.self_test_timeout, period_s),
         noise_limit: [&tension.f1, &tension.f2, &tension.f3, &tension.f4]
             .map(|channel| variance(channel.gain)),
+        fitted: fitted(parameters),
         rest_current: Current::from_f32(supervisor.rest_current),
         pretension: Tension::from_f32(parameters.tendon.pretension),
         pretension_band: Tension::from_f32(supervisor.pretension_band),

@@ -85,6 +85,10 @@ pub struct Tensions {
     pub margin: f32,
     /// Time for which they have to disagree, s.
     pub consistency_time: f32,
+    /// Which channels are there. 0: none, 1: f1 and f3, 2: all four.
+    pub fitted: f32,
+    /// How far the mean tension of a cable may be from the one that its stretch tells, N.
+    pub stretch_margin: f32,
 }
 
 /// Pulleys.
@@ -114,6 +118,12 @@ pub struct Sheath {
     pub friction_coefficient: f32,
     /// Wrap angle K, rad.
     pub wrap_angle: f32,
+    /// 1: mu K is followed while the joint moves; 0: it stays what the two parameters say.
+    pub adapts: f32,
+    /// How fast mu K changes while a sheath is moved, standard deviation after a second.
+    pub exponent_rate: f32,
+    /// Largest mu K that a sheath may have, however it is bent.
+    pub exponent_maximum: f32,
 }
 
 /// Position and torque loop.
@@ -137,6 +147,8 @@ pub struct Loops {
     pub torque_integral_time: f32,
     /// Torque loop: damping of the input pulley, N·m·s/rad.
     pub torque_damping: f32,
+    /// Torque loop: damping by the rate of the input torque, s.
+    pub tension_damping: f32,
     /// Torque loop: part of the sheath friction of Eq. (15)-(17) that is fed forward.
     pub friction_feedforward: f32,
 }

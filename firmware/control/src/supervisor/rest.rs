@@ -61,7 +61,7 @@ impl RestLook {
 
     fn restless(&self, config: &SupervisorConfig) -> Option<usize> {
         let ticks = u64::from(self.ticks);
-        for n in 0..4 {
+        for n in (0..4).filter(|n| config.fitted.has(*n)) {
             // n² times the variance: n Σd² − (Σd)². A look has 20 000 ticks at most and a code 12 bits: below 2^53.
             let sum = u64::from(self.sum_raw[n].unsigned_abs());
             let spread = (ticks * self.squares_raw[n]).saturating_sub(sum * sum);
@@ -81,27 +81,32 @@ impl RestLook {
 }
 
 impl RestVerdict {
-    /// Whether the mean over all four tensions, which stretch and friction leave at F0 (within 2 % at mu K = 0.4), is not
+    /// Whether the mean over all tensions that are measured, which stretch and friction leave at F0 (within 2 % at mu K = 0.4), is not
     /// the pretension. The channel named is the one that is farthest off.
     #[must_use]
     pub fn pretension_off(&self, config: &SupervisorConfig) -> Option<Detection> {
         let ticks = i64::from(self.ticks);
-        let sum: i64 = self.tension_bits.iter().sum();
+        let there = || (0..4).filter(|n| config.fitted.has(*n));
+        let channels: i64 = there().map(|_| 1).sum();
+        if channels == 0 {
+            return None;
+        }
+        let sum: i64 = there().map(|n| self.tension_bits[n]).sum();
         let wanted = i64::from(config.pretension.to_bits());
-        let band = i64::from(config.pretension_band.to_bits()) * 4 * ticks;
-        let excess = sum - wanted * 4 * ticks;
+        let band = i64::from(config.pretension_band.to_bits()) * channels * ticks;
+        let excess = sum - wanted * channels * ticks;
         if excess.abs() <= band {
             return None;
         }
         let distance = |n: &usize| (self.tension_bits[*n] - wanted * ticks).abs();
-        let farthest = (0..4).max_by_key(distance).unwrap_or(0);
+        let farthest = there().max_by_key(distance).unwrap_or(0);
         let limit = if excess < 0 {
             config.pretension.minus(config.pretension_band)
         } else {
             config.pretension.plus(config.pretension_band)
         };
         // A look is 1 s at most, 20 000 ticks, so the mean fits.
-        let mean = Tension::from_bits((sum / (4 * ticks.max(1))) as i32);
+        let mean = Tension::from_bits((sum / (channels * ticks.max(1))) as i32);
         Some(Detection::new(Fault::PretensionOff, farthest, mean.to_f32(), limit.to_f32()))
     }
 }

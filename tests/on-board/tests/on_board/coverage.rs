@@ -18,6 +18,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::TensionRail => "a_broken_tension_wire_is_at_a_rail",
         Fault::Slack | Fault::OverTension => "slack_and_overload_are_found",
         Fault::TensionInconsistent => "tensions_that_do_not_fit_the_friction_are_found",
+        Fault::StretchInconsistent => "tensions_that_contradict_the_stretch_are_found",
         Fault::OverCurrent => "over_current_stops_in_three_ticks",
         Fault::BusUnderVoltage | Fault::BusOverVoltage => "a_bus_voltage_out_of_range_stops",
         Fault::BridgeFault => "a_fault_of_the_bridge_stops_at_once",

@@ -121,8 +121,14 @@ fn slack_and_overload_are_found() -> Outcome {
 
 #[test]
 fn tensions_that_do_not_fit_the_friction_are_found() -> Outcome {
-    // 50 ms, and the low-pass of 5 ms.
-    injected(Injection::TensionOffset(TensionAt::F1, 45.0), Fault::TensionInconsistent, 0, 0.075).map(|_| ())
+    // 50 ms, and the low-pass of 5 ms: 5 N against 30 N.
+    injected(Injection::TensionOffset(TensionAt::F1, -25.0), Fault::TensionInconsistent, 0, 0.08).map(|_| ())
+}
+
+#[test]
+fn tensions_that_contradict_the_stretch_are_found() -> Outcome {
+    // 300 ms, and the low-pass of 5 ms: 24 N more than what the stretch tells, of which 20 N are allowed.
+    injected(Injection::TensionOffset(TensionAt::F1, 24.0), Fault::StretchInconsistent, 0, 0.34).map(|_| ())
 }
 
 #[test]
