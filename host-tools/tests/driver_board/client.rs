@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use bowden::link::{CommsError, LinkError};
+use bowden::link::{CommsError, LinkError, ParameterSet};
 use bowden_link::message::{Goal, Mode, Refusal};
 use bowden_link::{SCHEMA, State, ToBoard};
 
-use crate::fake::{Fake, Mishaps};
+use crate::fake::Fake;
+use crate::mishaps::Mishaps;
 use crate::wires::{TIMEOUT, connect};
 
 fn message(error: &LinkError) -> String {
@@ -46,6 +47,28 @@ fn what_is_lost_or_damaged_is_asked_for_again() {
     // A damaged frame is missing in the count of frames as well.
     assert!(losses.frames >= losses.damaged_frames + 15, "{losses:?}");
     assert_eq!(fake.borrow().violations, [""; 0]);
+}
+
+#[test]
+fn parameters_are_read_and_set_over_a_lossy_wire() {
+    let mishaps = Mishaps {
+        lose_answers: Some(3),
+        damage_answers: Some(5),
+        lose_requests: Some(7),
+        ..Mishaps::default()
+    };
+    let (client, fake) = connect(Fake::new(mishaps));
+    let mut client = client.unwrap();
+    let parameters = ParameterSet::read(&mut client).unwrap();
+    let index = |name: &str| parameters.find(name).unwrap().index;
+    // The new lower limit is above the old upper one, which follows.
+    let values =
+        [(index("tension.slack"), 95.0), (index("tension.over"), 120.0), (index("tendon.pretension"), 25.5)];
+    parameters.write(&mut client, &values).unwrap();
+    let fake = fake.borrow();
+    let names = ["tension.slack", "tension.over", "tendon.pretension", "motor.resistance"];
+    assert_eq!(names.map(|name| fake.value(name)), [95.0, 120.0, 25.5, 2.0]);
+    assert_eq!(fake.violations, [""; 0]);
 }
 
 #[test]

@@ -14,11 +14,22 @@ use bowden_link::{
     ToBoard,
 };
 
+use crate::mishaps::Mishaps;
+
 /// Time between two ticks.
 pub const PERIOD_NS: u64 = 100_000;
 
 /// Points that the stream holds.
 pub const STREAM: usize = 100;
+
+/// Length of the self test.
+const SELF_TEST_TICKS: u64 = 3000;
+
+/// Length of the pretension check.
+const PRETENSION_CHECK_TICKS: u64 = 2000;
+
+/// Length of homing.
+const HOMING_TICKS: u64 = 4000;
 
 /// Name, unit, smallest, largest, default.
 const PARAMETERS: [(&str, &str, f32, f32, f32); 38] = [
@@ -61,37 +72,6 @@ const PARAMETERS: [(&str, &str, f32, f32, f32); 38] = [
     ("supervisor.homing_timeout", "s", 0.1, 600.0, 20.0),
     ("supervisor.host_timeout", "s", 0.01, 60.0, 0.5),
 ];
-
-/// What is to go wrong.
-#[derive(Clone, Debug, Default)]
-pub struct Mishaps {
-    /// Answers nothing, ever.
-    pub silent: bool,
-    /// Another version of the protocol.
-    pub protocol_version: Option<u16>,
-    /// Another schema.
-    pub schema: Option<[u8; 8]>,
-    /// Every n-th answer is lost on the way.
-    pub lose_answers: Option<u64>,
-    /// Every n-th request is lost on the way.
-    pub lose_requests: Option<u64>,
-    /// Every n-th answer comes with a wrong byte.
-    pub damage_answers: Option<u64>,
-    /// Every n-th answer comes this much too late.
-    pub delay_answers: Option<(u64, Duration)>,
-    /// Every n-th batch of telemetry is lost on the way.
-    pub lose_batches: Option<u64>,
-    /// Every n-th batch comes with a wrong byte.
-    pub damage_batches: Option<u64>,
-    /// Every n-th batch comes twice.
-    pub repeat_batches: Option<u64>,
-    /// Ticks after the start of a run at which a tendon goes slack.
-    pub slack_after: Option<u64>,
-    /// Ticks after the start of a run at which the board starts again.
-    pub restart_after: Option<u64>,
-    /// Ticks after the start of a run from which on control stands still.
-    pub stand_still_after: Option<u64>,
-}
 
 /// The board.
 pub struct Fake {
@@ -215,7 +195,9 @@ impl Fake {
         }
         self.tick = self.tick.wrapping_add(1);
         match self.state {
-            State::SelfTest if self.now_ns >= self.until => self.go(State::PretensionCheck, 200),
+            State::SelfTest if self.now_ns >= self.until => {
+                self.go(State::PretensionCheck, PRETENSION_CHECK_TICKS);
+            }
             State::PretensionCheck | State::Homing if self.now_ns >= self.until => self.go(State::Ready, 0),
             State::Run => self.run(),
             _ => {}
@@ -311,10 +293,12 @@ impl Fake {
             }
             Err(refusal) => FromBoard::Refused(refusal),
         };
-        self.answers += 1;
-        let is = |every: Option<u64>| every.is_some_and(|every| self.answers.is_multiple_of(every));
+        let at_risk = !self.mishaps.only_statuses || request.message == ToBoard::ReadStatus;
+        self.answers += u64::from(at_risk);
+        let is =
+            |every: Option<u64>| at_risk && every.is_some_and(|every| self.answers.is_multiple_of(every));
         let delay = match self.mishaps.delay_answers {
-            Some((every, delay)) if self.answers.is_multiple_of(every) => delay,
+            Some((every, delay)) if is(Some(every)) => delay,
             _ => Duration::ZERO,
         };
         let (lost, damaged) = (is(self.mishaps.lose_answers), is(self.mishaps.damage_answers));
@@ -441,11 +425,12 @@ impl Fake {
         match (goal, self.state) {
             (Goal::Off, State::Fault) => return Err(Refusal::WrongState(self.state)),
             (Goal::Off, _) => self.state = State::Off,
-            (Goal::Ready, State::Off | State::Ready) => self.go(State::SelfTest, 300),
-            (Goal::Home, State::Ready) => self.go(State::Homing, 400),
+            (Goal::Ready, State::Off | State::Ready) => self.go(State::SelfTest, SELF_TEST_TICKS),
+            (Goal::Home, State::Ready) => self.go(State::Homing, HOMING_TICKS),
             (Goal::Run(mode), State::Ready) => {
                 self.mode = mode;
                 self.ran_ticks = 0;
+                self.batches = 0;
                 self.state = State::Run;
             }
             (Goal::ClearFault, State::Fault) => {

@@ -2,9 +2,12 @@
 
 use std::time::Duration;
 
+use bowden_link::ToBoard;
+
 use crate::bowden;
-use crate::fake::{Fake, Mishaps};
-use crate::wires::Terminal;
+use crate::fake::Fake;
+use crate::mishaps::Mishaps;
+use crate::pseudo_terminal::Terminal;
 
 fn assert_refused(arguments: &[&str], expected: &str) {
     let folder = tempfile::tempdir().unwrap();
@@ -60,10 +63,12 @@ fn a_board_of_another_version_is_not_talked_to() {
     let terminal = Terminal::new(Fake::new(Mishaps { protocol_version: Some(7), ..Mishaps::default() }));
     let port = terminal.port();
     let expected = format!(
-        "{port}: firmware 9.8.7 speaks protocol version 7, expected 1; use the bowden that belongs to this firmware"
+        "bowden: {port}: firmware 9.8.7 speaks protocol version 7, expected 1; use the bowden that belongs to this firmware\n"
     );
-    assert_refused(&["record", "--port", port, "--out", "a.csv", "--seconds", "1"], &expected);
-    assert_eq!(terminal.fake().carried_out.len(), 1);
+    let folder = tempfile::tempdir().unwrap();
+    let refused = terminal.bowden(folder.path(), "record", &["--out", "a.csv", "--seconds", "1"]);
+    assert_eq!(refused, (2, String::new(), expected));
+    assert!(terminal.fake().carried_out.iter().all(|message| *message == ToBoard::Hello));
 }
 
 #[test]

@@ -8,7 +8,8 @@ use bowden::link::{CommsError, LinkError, RunEnd, Session};
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{Fault, State, ToBoard};
 
-use crate::fake::{Fake, Mishaps};
+use crate::fake::Fake;
+use crate::mishaps::Mishaps;
 use crate::wires::connect;
 
 const SINE: Reference =

@@ -1,19 +1,21 @@
-//! The commands as processes, over a pseudo terminal with the fake board behind it, in real time.
+//! The commands as processes, over a pseudo terminal with the fake board behind it.
 
 use std::f64::consts::TAU;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command};
 use std::time::Duration;
 
+use bowden::link::client::DEFAULT_TIMEOUT;
 use bowden::recording::{Column, ReadOptions, Recording};
 use bowden_link::message::Goal;
 use bowden_link::{Fault, FaultRecord, State, ToBoard};
 use bowden_model::channel::Channel;
 
-use crate::fake::{Fake, Mishaps, signals};
-use crate::wires::Terminal;
-use crate::{bowden, command, told};
+use crate::fake::{Fake, signals};
+use crate::mishaps::Mishaps;
+use crate::pseudo_terminal::Terminal;
+use crate::{bowden, result_of};
 
 fn load(folder: &Path, name: &str) -> Recording {
     Recording::load(&folder.join(name), &ReadOptions::default()).unwrap()
@@ -38,8 +40,7 @@ fn a_recording_holds_every_tick_in_si_units_and_as_it_came() {
     let folder = tempfile::tempdir().unwrap();
     let arguments =
         ["--out", "a.csv", "--seconds", "0.5", "--reference", "sine", "--home", "--rig", "rig.toml"];
-    let arguments = [&["record", "--port", terminal.port()], arguments.as_slice()].concat();
-    let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+    let (status, stdout, stderr) = terminal.bowden(folder.path(), "record", &arguments);
     assert_eq!((status, stderr.as_str()), (0, ""));
     assert_eq!(stdout, "a.csv: 5000 rows over 0.500 s, tick 100.0 us\n");
 
@@ -88,15 +89,20 @@ fn a_recording_holds_every_tick_in_si_units_and_as_it_came() {
 }
 
 #[test]
-fn lost_samples_leave_gaps_and_are_told() {
+fn lost_samples_leave_gaps_and_are_reported() {
     for mishaps in [
-        Mishaps { lose_batches: Some(50), lose_answers: Some(9), ..Mishaps::default() },
-        Mishaps { damage_batches: Some(50), damage_answers: Some(9), ..Mishaps::default() },
+        Mishaps { lose_batches: Some(50), lose_answers: Some(2), only_statuses: true, ..Mishaps::default() },
+        Mishaps {
+            damage_batches: Some(50),
+            damage_answers: Some(2),
+            only_statuses: true,
+            ..Mishaps::default()
+        },
     ] {
         let terminal = Terminal::new(Fake::new(mishaps));
         let folder = tempfile::tempdir().unwrap();
-        let arguments = ["record", "--port", terminal.port(), "--out", "a.csv.gz", "--seconds", "0.4"];
-        let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+        let arguments = ["--out", "a.csv.gz", "--seconds", "0.4"];
+        let (status, stdout, stderr) = terminal.bowden(folder.path(), "record", &arguments);
         assert_eq!(status, 3, "{stderr}");
         let recording = load(folder.path(), "a.csv.gz");
         let ticks = ticks(&recording);
@@ -106,24 +112,28 @@ fn lost_samples_leave_gaps_and_are_told() {
             .map(|pair| (pair[0] + 1, pair[1] - pair[0] - 1))
             .collect();
         let missing: u32 = gaps.iter().map(|(_, length)| length).sum();
-        assert!(gaps.len() >= 3 && missing as usize == 24 * gaps.len(), "{gaps:?}");
+        // A run of 4000 samples begins in batch 1 and ends in batch 167 or 168; batches 50, 100 and 150 are missing.
+        assert_eq!((gaps.len(), missing), (3, 3 * 24), "{gaps:?}");
         assert_eq!(recording.len() + missing as usize, 4000);
-        let plural = format!("{missing} samples lost in {} gaps, the first at t_s = {:?};", gaps.len(), {
-            f64::from(gaps[0].0) / 1e4
-        });
-        assert!(stderr.starts_with(&format!("bowden: a.csv.gz: {plural}")), "{stderr}");
+        let first_s = f64::from(gaps[0].0) / 1e4;
+        let expected =
+            format!("bowden: a.csv.gz: 72 samples lost in 3 gaps, the first at t_s = {first_s:?};");
+        assert!(stderr.starts_with(&expected), "{stderr}");
         assert_eq!(stderr.lines().count(), 1);
         assert_eq!(stdout, format!("a.csv.gz: {} rows over 0.400 s, tick 100.0 us\n", recording.len()));
-        assert_eq!(terminal.fake().violations, [""; 0]);
+        let fake = terminal.fake();
+        // Every second answer to them failed.
+        assert!(fake.count(|message| *message == ToBoard::ReadStatus) >= 4);
+        assert_eq!(fake.violations, [""; 0]);
     }
 }
 
 #[test]
-fn a_fault_during_the_run_keeps_the_recording_and_says_why() {
+fn a_fault_during_the_run_is_reported_and_keeps_the_recording() {
     let terminal = Terminal::new(Fake::new(Mishaps { slack_after: Some(1500), ..Mishaps::default() }));
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["record", "--port", terminal.port(), "--out", "a.csv", "--seconds", "1"];
-    let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+    let (status, stdout, stderr) =
+        terminal.bowden(folder.path(), "record", &["--out", "a.csv", "--seconds", "1"]);
     let recording = load(folder.path(), "a.csv");
     let tick = *ticks(&recording).last().unwrap();
     let record = FaultRecord { fault: Fault::Slack, channel: 2, tick, got: 0.25, limit: 1.0 };
@@ -132,10 +142,9 @@ fn a_fault_during_the_run_keeps_the_recording_and_says_why() {
     assert_eq!(recording.channel(Channel::DriveEnable).unwrap()[1498..], [1.0, 0.0]);
 
     // Until somebody clears it, it stays.
-    let (status, _, stderr) = bowden(folder.path(), &["send", "--port", terminal.port(), "ready"]);
+    let (status, _, stderr) = terminal.bowden(folder.path(), "send", &["ready"]);
     assert_eq!((status, stderr), (1, format!("bowden: {record}\n")));
-    let (status, stdout, _) =
-        bowden(folder.path(), &["faults", "--port", terminal.port(), "--clear", "--snapshot", "s.csv"]);
+    let (status, stdout, _) = terminal.bowden(folder.path(), "faults", &["--clear", "--snapshot", "s.csv"]);
     assert_eq!(status, 0);
     for line in [
         "state: fault",
@@ -156,13 +165,11 @@ fn a_fault_during_the_run_keeps_the_recording_and_says_why() {
 }
 
 #[test]
-fn what_the_board_refuses_is_told_and_nothing_is_left() {
+fn a_refusal_is_reported_and_leaves_no_file() {
     let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
-    let port = terminal.port();
     let arguments = ["--out", "a.csv", "--seconds", "1", "--reference", "sine", "--amplitude", "40"];
-    let (status, stdout, stderr) =
-        bowden(folder.path(), &[&["record", "--port", port], arguments.as_slice()].concat());
+    let (status, stdout, stderr) = terminal.bowden(folder.path(), "record", &arguments);
     assert_eq!(
         (status, stdout.as_str(), stderr.as_str()),
         (
@@ -172,7 +179,7 @@ fn what_the_board_refuses_is_told_and_nothing_is_left() {
         )
     );
     assert_eq!(terminal.fake().state, State::Off);
-    let (status, _, stderr) = bowden(folder.path(), &["send", "--port", port, "home"]);
+    let (status, _, stderr) = terminal.bowden(folder.path(), "send", &["home"]);
     let expected =
         "bowden: the board refused to home: not possible in state off; `bowden send ready` comes first\n";
     assert_eq!((status, stderr.as_str()), (1, expected));
@@ -181,14 +188,9 @@ fn what_the_board_refuses_is_told_and_nothing_is_left() {
 
 #[test]
 fn parameters_are_listed_set_and_kept_in_files() {
-    let terminal = Terminal::new(Fake::new(Mishaps { lose_answers: Some(11), ..Mishaps::default() }));
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
-    let params = |arguments: &[&str]| {
-        bowden(
-            folder.path(),
-            &[&["params", "--timeout", "0.5", "--port", terminal.port()], arguments].concat(),
-        )
-    };
+    let params = |arguments: &[&str]| terminal.bowden(folder.path(), "params", arguments);
     let (status, listed, _) = params(&[]);
     assert_eq!((status, listed.lines().count()), (0, 38));
     let (_, stdout, _) = params(&["get", "tendon.pretension"]);
@@ -275,9 +277,7 @@ fn parameters_are_listed_set_and_kept_in_files() {
 fn single_steps_lead_from_state_to_state() {
     let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
-    let send = |arguments: &[&str]| {
-        bowden(folder.path(), &[&["send", "--port", terminal.port()], arguments].concat())
-    };
+    let send = |arguments: &[&str]| terminal.bowden(folder.path(), "send", arguments);
     assert_eq!(send(&["ready"]), (0, "state: ready\n".to_owned(), String::new()));
     assert_eq!(send(&["home"]), (0, "state: ready\n".to_owned(), String::new()));
     // Longer than the board lets its host be silent.
@@ -303,21 +303,35 @@ fn single_steps_lead_from_state_to_state() {
     assert_eq!(terminal.fake().violations, [""; 0]);
 }
 
+/// Bytes of a recording that holds more than 1000 rows in either format: a row of CSV takes less than 250, one of MCAP less.
+const THOUSAND_ROWS: u64 = 250_000;
+
+/// Bytes on the disk of the recording that is being written in `folder`.
+fn recorded_bytes(folder: &Path) -> u64 {
+    // A file that gets its final name meanwhile counts as empty.
+    fs::read_dir(folder).unwrap().map(|file| file.unwrap().metadata().map_or(0, |file| file.len())).sum()
+}
+
+/// Waits until `bowden record` has written so many bytes to its file in `folder`.
+fn wait_for_bytes(bytes: u64, folder: &Path, child: &mut Child) {
+    while recorded_bytes(folder) < bytes {
+        assert_eq!(child.try_wait().unwrap(), None, "the run ended by itself");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
+}
+
 #[test]
 fn ctrl_c_ends_a_recording_whole() {
     let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
-    let child = command(folder.path(), &["record", "--port", terminal.port(), "--out", "a.mcap"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    while terminal.fake().state != State::Run {
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    std::thread::sleep(Duration::from_millis(300));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let (status, stdout, stderr) = told(&child.wait_with_output().unwrap());
+    let mut child = terminal.start_recording(folder.path(), "a.mcap");
+    wait_for_bytes(THOUSAND_ROWS, folder.path(), &mut child);
+    signal(&child, "-INT");
+    let (status, stdout, stderr) = result_of(&child.wait_with_output().unwrap());
     assert_eq!((status, stderr.as_str()), (0, ""));
     let recording = load(folder.path(), "a.mcap");
     assert!(stdout.starts_with(&format!("a.mcap: {} rows over ", recording.len())), "{stdout}");
@@ -331,21 +345,14 @@ fn ctrl_c_ends_a_recording_whole() {
 }
 
 #[test]
-fn a_pulled_plug_keeps_what_came_before() {
+fn a_pulled_plug_keeps_the_rows_before_it() {
     let mut terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
     let port = terminal.port().to_owned();
-    let child = command(folder.path(), &["record", "--port", &port, "--out", "a.csv"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    while terminal.fake().state != State::Run {
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    std::thread::sleep(Duration::from_millis(300));
+    let mut child = terminal.start_recording(folder.path(), "a.csv");
+    wait_for_bytes(THOUSAND_ROWS, folder.path(), &mut child);
     terminal.unplug();
-    let (status, _, stderr) = told(&child.wait_with_output().unwrap());
+    let (status, _, stderr) = result_of(&child.wait_with_output().unwrap());
     let rows = load(folder.path(), "a.csv").len();
     assert_eq!(status, 1);
     assert!(rows > 1000, "{rows} rows");
@@ -355,4 +362,28 @@ fn a_pulled_plug_keeps_what_came_before() {
         "{stderr}"
     );
     assert_eq!(stderr.lines().count(), 1);
+}
+
+#[test]
+fn a_slow_board_and_a_slow_host_cost_no_sample() {
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    let folder = tempfile::tempdir().unwrap();
+    // The board answers nothing for longer than `bowden` waits by default.
+    let fake = terminal.fake();
+    let mut child = terminal.start_recording(folder.path(), "a.csv");
+    std::thread::sleep(DEFAULT_TIMEOUT * 6 / 5);
+    drop(fake);
+    wait_for_bytes(THOUSAND_ROWS, folder.path(), &mut child);
+    // The host stands still for longer than the board lets it be silent.
+    signal(&child, "-STOP");
+    let silence_s = terminal.fake().value("supervisor.host_timeout");
+    std::thread::sleep(Duration::from_secs_f32(1.5 * silence_s));
+    signal(&child, "-CONT");
+    wait_for_bytes(recorded_bytes(folder.path()) + THOUSAND_ROWS, folder.path(), &mut child);
+    signal(&child, "-INT");
+    let (status, _, stderr) = result_of(&child.wait_with_output().unwrap());
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let ticks = ticks(&load(folder.path(), "a.csv"));
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    assert_eq!(terminal.fake().violations, [""; 0]);
 }
