@@ -1,54 +1,63 @@
-//! Ctrl-C during a diagnosis: what was found so far is written, and said to be incomplete.
+//! Ctrl-C during a diagnosis: the results so far are written and marked as incomplete.
 #![cfg(unix)]
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::io::Errno;
 
 const RIG: &str = include_str!("rigs/bench.toml");
 
-fn bowden(folder: &Path, arguments: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_bowden"))
-        .args(arguments)
-        .current_dir(folder)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+fn bowden(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bowden"));
+    command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
 }
 
-fn wait(mut child: Child) -> Output {
-    let limit = Instant::now() + Duration::from_mins(2);
-    while child.try_wait().unwrap().is_none() {
-        assert!(Instant::now() < limit, "it goes on after two minutes");
-        sleep(Duration::from_millis(20));
+/// Opens a named pipe for writing as soon as `reader` has opened it for reading.
+fn open_for(reader: &mut Child, pipe: &Path) -> File {
+    loop {
+        let opened =
+            File::options().write(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed()).open(pipe);
+        match opened {
+            Ok(file) => {
+                fcntl_setfl(&file, OFlags::empty()).unwrap();
+                return file;
+            }
+            Err(error) => assert_eq!(Errno::from_io_error(&error), Some(Errno::NXIO), "{error}"),
+        }
+        assert_eq!(reader.try_wait().unwrap(), None, "it ended without reading the recording");
+        sleep(Duration::from_millis(5));
     }
-    child.wait_with_output().unwrap()
 }
 
 #[test]
-fn an_interrupted_diagnosis_leaves_what_it_has() {
+fn an_interrupted_diagnosis_writes_its_results_so_far() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path();
     fs::write(place.join("rig.toml"), RIG).unwrap();
     // Another rig than the one that is diagnosed, so that there is something to look for.
     fs::write(place.join("true.toml"), RIG.replace("= 0.12", "= 0.16")).unwrap();
-    let made =
-        wait(bowden(place, &["simulate", "--rig", "true.toml", "--out", "run.csv", "--seconds", "60"]));
-    assert!(made.status.success());
+    let simulate = ["simulate", "--rig", "true.toml", "--out", "run.csv", "--seconds", "60"];
+    assert!(bowden(place, &simulate).status().unwrap().success());
 
-    let child = bowden(place, &["diagnose", "run.csv", "--rig", "rig.toml", "--out", "found"]);
-    // The folder is made once the recording has been read; the search then takes many times longer than this wait.
-    let limit = Instant::now() + Duration::from_mins(1);
-    while !place.join("found").exists() {
-        assert!(Instant::now() < limit, "the recording is not read");
-        sleep(Duration::from_millis(5));
-    }
+    // The recording comes through a pipe, so that the search cannot begin before the signal is sent.
+    let pipe = place.join("pipe.csv");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let diagnose = ["diagnose", "pipe.csv", "--rig", "rig.toml", "--out", "found", "--quiet"];
+    let mut child = bowden(place, &diagnose).spawn().unwrap();
+    let mut recording = open_for(&mut child, &pipe);
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
-    let output = wait(child);
+    recording.write_all(&fs::read(place.join("run.csv")).unwrap()).unwrap();
+    drop(recording);
+    let output = child.wait_with_output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{said}");
     assert!(said.contains("stopped early"), "{said}");
