@@ -74,17 +74,21 @@ impl Terminal {
         &self.path
     }
 
-    /// Moves waiting bytes between the terminal and `board`. Bytes for which the terminal has no room wait, and the
-    /// host stops reading the device once 4096 of them do.
+    /// Moves waiting bytes between the terminal and `board`, and returns how many the tool has sent. Bytes for which the
+    /// terminal has no room wait, and the host stops reading the device once 4096 of them do.
     ///
     /// # Errors
     /// [`BoardError::Terminal`] if the terminal fails.
-    pub fn exchange(&mut self, board: &mut Board) -> Result<(), BoardError> {
+    pub fn exchange(&mut self, board: &mut Board) -> Result<usize, BoardError> {
         let mut buffer = [0; 1024];
+        let mut received = 0;
         while board.usb_ready() && board.usb_unsent() < WAITING {
             match self.controller.read(&mut buffer) {
                 Ok(0) => break,
-                Ok(count) => board.usb_write(&buffer[..count]),
+                Ok(count) => {
+                    received += count;
+                    board.usb_write(&buffer[..count]);
+                }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) => return Err(failed("read", error)),
             }
@@ -102,11 +106,16 @@ impl Terminal {
                 Err(error) => return Err(failed("write", error)),
             }
         }
-        Ok(())
+        Ok(received)
     }
 
-    /// Runs `board` for `seconds` of board time with its port on the terminal; `pace` 1 holds board time back to real
-    /// time, `None` runs as fast as it goes. `each` is called every quarter of a millisecond of board time.
+    /// Whether bytes of the board wait for room in the terminal.
+    pub fn is_full(&self) -> bool {
+        !self.to_tool.is_empty()
+    }
+
+    /// Runs `board` for `seconds` of board time with its port on the terminal. `realtime` keeps board time from running
+    /// ahead of real time. `each` is called every quarter of a millisecond of board time.
     ///
     /// # Errors
     /// As [`Self::exchange`] and [`Board::run_for`].

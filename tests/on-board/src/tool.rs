@@ -3,6 +3,7 @@
 use std::env;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use bowden_board::{Board, Terminal};
 
@@ -10,9 +11,18 @@ use crate::image::target_folder;
 use crate::{Failure, Outcome, fail};
 
 /// Board time between two looks at the tool \[s\].
-const LOOK_S: f64 = 5e-3;
+const LOOK_S: f64 = 0.25e-3;
+/// Board time that passes after a request of the tool unless the next one comes \[s\]: less than the 0.5 s of silence that the
+/// board allows its host, more than it takes to store parameters.
+const TIME_PER_REQUEST_S: f64 = 0.4;
 /// Board time after which a tool has to be done \[s\].
 const LIMIT_S: f64 = 120.0;
+/// Value of `--timeout` \[s\]: the largest that the tool takes.
+const ANSWER_LIMIT_S: &str = "600";
+/// Real time without a request after which a tool counts as hung.
+const HANG_LIMIT: Duration = Duration::from_mins(10);
+/// Real time between two looks at a tool for which the board waits.
+const WAIT: Duration = Duration::from_millis(1);
 
 /// What a run of the tool gave.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,7 +65,10 @@ impl Plugged {
         Ok(Self { board, terminal })
     }
 
-    /// Runs `bowden <command> --port <terminal> <arguments>` while the board runs, not faster than real time.
+    /// Runs `bowden <command> --port <terminal> --timeout 600 <arguments>` while the board runs.
+    ///
+    /// Neither side depends on how fast this machine is: the board stands still while the terminal has no room for its bytes, and
+    /// [`TIME_PER_REQUEST_S`] after the last request of the tool. A slow tool is therefore never silent and loses no sample.
     pub fn run(&mut self, command: &str, arguments: &[&str]) -> Outcome<Ran> {
         let path = tool()?;
         let what = format!("{} {command} {}", path.display(), arguments.join(" "));
@@ -64,6 +77,7 @@ impl Plugged {
             .arg(command)
             .arg("--port")
             .arg(self.terminal.path())
+            .args(["--timeout", ANSWER_LIMIT_S])
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -73,11 +87,26 @@ impl Plugged {
         // Another thread reads what it prints, so that it never waits for us.
         let waiting = std::thread::spawn(move || child.wait_with_output());
         let end_s = self.board.time_s() + LIMIT_S;
+        let mut allowed_until_s = self.board.time_s();
+        let mut heard = Instant::now();
         while !waiting.is_finished() {
+            if self.terminal.exchange(&mut self.board)? > 0 {
+                heard = Instant::now();
+                allowed_until_s = self.board.time_s() + TIME_PER_REQUEST_S;
+            }
+            // Without a port the board cannot be asked, and is on the way to one.
+            let allowed = self.board.time_s() < allowed_until_s || !self.board.usb_ready();
+            if allowed && !self.terminal.is_full() {
+                self.board.run_for(LOOK_S)?;
+            } else {
+                std::thread::sleep(WAIT);
+            }
             if self.board.time_s() > end_s {
                 return fail(format!("{what}: not done within {LIMIT_S} s of board time"));
             }
-            self.terminal.serve(&mut self.board, LOOK_S, true, |_| {})?;
+            if heard.elapsed() > HANG_LIMIT {
+                return fail(format!("{what}: not done {} s after its last request", HANG_LIMIT.as_secs()));
+            }
         }
         let output = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
         let output = output.map_err(failed)?;
