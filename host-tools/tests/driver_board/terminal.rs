@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fs;
+use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Command};
 use std::time::Duration;
@@ -315,7 +316,11 @@ fn recorded_bytes(folder: &Path) -> u64 {
 /// Waits until `bowden record` has written so many bytes to its file in `folder`.
 fn wait_for_bytes(bytes: u64, folder: &Path, child: &mut Child) {
     while recorded_bytes(folder) < bytes {
-        assert_eq!(child.try_wait().unwrap(), None, "the run ended by itself");
+        if let Some(status) = child.try_wait().unwrap() {
+            let mut stderr = String::new();
+            child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+            panic!("the run ended by itself, {status}: {stderr}");
+        }
         std::thread::sleep(Duration::from_millis(10));
     }
 }
