@@ -311,14 +311,26 @@ impl BenchConfig {
         self.mass_kg * self.arm_m * self.arm_m + self.load_inertia_kg_m2
     }
 
+    /// Largest wrap angle for which the integration step is short enough \[rad\]; infinite without bends.
+    pub(crate) fn largest_wrap_angle_rad(&self) -> f64 {
+        let element_m = self.element_m();
+        let node_kg = self.tendon_mass_kg_per_m * element_m;
+        let limit_n_per_m = node_kg * (STEP_FREQUENCY_LIMIT / self.step_s).powi(2);
+        let bristle_n_per_m = limit_n_per_m - 4.0 * self.axial_stiffness_n / element_m;
+        bristle_n_per_m
+            / (self.bristle_stiffness_per_m * self.tension_full_scale_n * self.widest_bend_share())
+    }
+
+    fn widest_bend_share(&self) -> f64 {
+        crate::sheath::node_bends(self.nodes, &self.bends).iter().fold(0.0_f64, |a, b| a.max(*b))
+    }
+
     /// Upper bound of the fastest natural frequency: tendon mesh with stuck bristles, or a pulley on its hubs \[rad/s\].
     fn fastest_mode_rad_per_s(&self) -> f64 {
         let element_m = self.element_m();
         let node_kg = self.tendon_mass_kg_per_m * element_m;
         let element_n_per_m = self.axial_stiffness_n / element_m;
-        let widest_bend_rad =
-            crate::sheath::node_bends(self.nodes, &self.bends).iter().fold(0.0_f64, |a, b| a.max(*b))
-                * self.wrap_angle_rad;
+        let widest_bend_rad = self.widest_bend_share() * self.wrap_angle_rad;
         let bristle_n_per_m = self.bristle_stiffness_per_m * self.tension_full_scale_n * widest_bend_rad;
         let tendon = ((4.0 * element_n_per_m + bristle_n_per_m) / node_kg).sqrt();
         let rope_nm_per_rad = 2.0 * element_n_per_m * self.input_radius_m.max(self.output_radius_m).powi(2);

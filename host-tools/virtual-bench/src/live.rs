@@ -26,6 +26,7 @@ pub struct LiveBench {
     plant: Plant,
     noise: Draw,
     supply_v: f64,
+    largest_wrap_angle_rad: f64,
     steps: u64,
 }
 
@@ -46,6 +47,7 @@ impl LiveBench {
             effects,
             noise: Draw::new(seed, "live sensor noise"),
             supply_v: config.supply_v,
+            largest_wrap_angle_rad: config.largest_wrap_angle_rad(),
             steps: 0,
             config: config.clone(),
         })
@@ -111,6 +113,30 @@ impl LiveBench {
         self.plant.set_pretension_ratio(ratio);
     }
 
+    /// Moves the sheaths: sets the wrap angle K of cable a and b \[rad\], each bend keeping its share.
+    ///
+    /// Only the bend angles change: neither the length of a sheath nor what `bending_friction` preloads.
+    ///
+    /// # Errors
+    /// [`BenchError::Parameter`] if an angle is negative, not finite, or too large for the integration step; the sheaths
+    /// stay where they were.
+    pub fn set_wrap_angle_rad(&mut self, wrap_angle_rad: [f64; 2]) -> Result<(), BenchError> {
+        for wrap in wrap_angle_rad {
+            if !(wrap.is_finite() && wrap >= 0.0) {
+                return Err(BenchError::parameter("wrap_angle_rad", wrap, "an angle of 0 or more"));
+            }
+            if wrap > self.largest_wrap_angle_rad {
+                return Err(BenchError::parameter(
+                    "wrap_angle_rad",
+                    wrap,
+                    "an angle for which step_s is short enough",
+                ));
+            }
+        }
+        self.plant.set_wrap_angle_rad(wrap_angle_rad);
+        Ok(())
+    }
+
     /// Whether the state is finite.
     pub fn is_finite(&self) -> bool {
         self.tensions_n()
@@ -161,6 +187,8 @@ impl LiveBench {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use crate::{Drive, record_driven};
 
@@ -210,6 +238,38 @@ mod tests {
         let [f1, f2, f3, f4] = bench.tensions_n();
         // The pulleys share the imbalance of 15 N: both cables end near its middle, a below 30 N, none above.
         assert!(f1 < 29.0 && f2 < 29.0 && f3 < 30.0 && f4 < 30.0, "{f1} {f2} {f3} {f4}");
+    }
+
+    #[test]
+    fn moved_sheaths_have_the_end_tension_ratio_of_their_new_wrap_angle() {
+        let mut bench = LiveBench::new(&BenchConfig::default(), &[], 1).expect("default bench");
+        let wrap = [0.5 * PI, 1.5 * PI];
+        bench.set_wrap_angle_rad(wrap).expect("angles in range");
+        // The motor can carry 0.65 N·m less 0.34 N·m of friction: 0.43 rad, which it nears with 0.6 s; 0.37 rad are 5.5 mm, where
+        // 0.5 mm make either tendon slip.
+        for _ in 0..120_000 {
+            bench.step(Bridge::Duty(0.06));
+        }
+        assert!(bench.omega_out_rad_per_s() > 0.05 && bench.theta_out_rad() > 0.2, "still moving");
+        let [f1, f2, f3, f4] = bench.tensions_n();
+        // Mesh and viscous term as in `full_slip_ratio_is_the_capstan_ratio`, inertia of the tendon below 1e-3.
+        for (ratio, wrap) in [(f1 / f2, wrap[0]), (f4 / f3, wrap[1])] {
+            let capstan = (0.12 * wrap).exp();
+            assert!((ratio / capstan - 1.0).abs() < 2e-3, "K {wrap}: {ratio} against {capstan}");
+        }
+    }
+
+    #[test]
+    fn a_wrap_angle_that_the_step_cannot_follow_is_refused() {
+        let config = BenchConfig::default();
+        let mut bench = LiveBench::new(&config, &[], 1).expect("default bench");
+        let limit_rad = config.largest_wrap_angle_rad();
+        let at = |wrap_angle_rad: f64| BenchConfig { wrap_angle_rad, ..config.clone() }.validate();
+        assert!(at(0.999 * limit_rad).is_ok() && at(1.001 * limit_rad).is_err(), "{limit_rad}");
+        assert!(bench.set_wrap_angle_rad([0.999 * limit_rad, 0.0]).is_ok());
+        for wrong in [-0.1, f64::NAN, 1.001 * limit_rad] {
+            assert!(bench.set_wrap_angle_rad([1.0, wrong]).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -88,7 +88,10 @@ pub(crate) struct Plant {
     tendons: [Tendon; 2],
     /// Normal force of the nodes without tension \[N\]; empty without that effect.
     preload_n: Vec<f64>,
-    nominal_bend_rad: Vec<f64>,
+    /// Bend angle under each mass of cable a and b, as far as no effect changes it \[rad\].
+    nominal_bend_rad: [Vec<f64>; 2],
+    /// Share of the wrap angle under each mass \[1\].
+    bend_share: Vec<f64>,
     first_bend_share: Vec<f64>,
     last_bend_share: Vec<f64>,
     current_a: f64,
@@ -142,7 +145,8 @@ impl Plant {
             state,
             tendons: [tendon.clone(), tendon],
             preload_n,
-            nominal_bend_rad,
+            nominal_bend_rad: [nominal_bend_rad.clone(), nominal_bend_rad],
+            bend_share: sheath::node_bends(config.nodes, &config.bends),
             first_bend_share,
             last_bend_share,
             current_a: 0.0,
@@ -194,6 +198,18 @@ impl Plant {
     /// Sets the pretension of cable a and b over that of the configuration \[1\].
     pub(crate) fn set_pretension_ratio(&mut self, ratio: [f64; 2]) {
         self.pretension_ratio = ratio;
+    }
+
+    /// Sets the wrap angle K of the sheaths of cable a and b \[rad\]; each bend keeps its share.
+    pub(crate) fn set_wrap_angle_rad(&mut self, wrap_angle_rad: [f64; 2]) {
+        for ((tendon, nominal), wrap) in
+            self.tendons.iter_mut().zip(&mut self.nominal_bend_rad).zip(wrap_angle_rad)
+        {
+            for (bend, share) in nominal.iter_mut().zip(&self.bend_share) {
+                *bend = share * wrap;
+            }
+            tendon.bend_rad.clone_from(nominal);
+        }
     }
 
     /// One step under a constant duty.
@@ -336,11 +352,9 @@ impl Plant {
         }
         let last_rad = pose.as_ref().map_or(0.0, |law| law.change_rad(self.arm.angle_rad));
         let first_rad = disturbed.as_ref().map_or(0.0, |law| law.change_rad(self.clock_s));
-        for tendon in &mut self.tendons {
+        for (tendon, nominal) in self.tendons.iter_mut().zip(&self.nominal_bend_rad) {
             let shares = self.first_bend_share.iter().zip(&self.last_bend_share);
-            for ((bend, nominal), (first, last)) in
-                tendon.bend_rad.iter_mut().zip(&self.nominal_bend_rad).zip(shares)
-            {
+            for ((bend, nominal), (first, last)) in tendon.bend_rad.iter_mut().zip(nominal).zip(shares) {
                 *bend = (nominal + first_rad * first + last_rad * last).max(0.0);
             }
         }
