@@ -55,7 +55,7 @@ parameter_table! {
     controller.observer_bandwidth, "Hz", 1.0, 500.0, 20.0, true;
     controller.acceleration_feedforward, "", 0.0, 1.2, 1.0, true;
     controller.load_feedforward, "", 0.0, 1.2, 1.0, true;
-    controller.torque_gain, "", 0.0, 20.0, 8.0, true;
+    controller.torque_gain, "", 0.0, 40.0, 12.0, true;
     controller.torque_integral_time, "s", 0.005, 100.0, 0.1, true;
     controller.torque_damping, "N·m·s/rad", 0.0, 10.0, 0.2, true;
     controller.friction_feedforward, "", 0.0, 1.2, 1.0, true;
@@ -93,5 +93,5 @@ parameter_table! {
     sheath.adapts, "", 0.0, 1.0, 1.0, true;
     sheath.exponent_rate, "1/s", 0.0, 10.0, 0.1, true;
     sheath.exponent_maximum, "", 0.0, 3.0, 1.2, true;
-    controller.tension_damping, "s", 0.0, 1.0, 0.02, true;
+    controller.tension_damping, "s", 0.0, 1.0, 0.03, true;
 }
