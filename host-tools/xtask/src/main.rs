@@ -1,4 +1,4 @@
-//! `cargo xtask`: demonstration, images, lints, tests and benchmarks of the workspace, one command each.
+//! `cargo xtask`: demonstration, images, lints, tests, benchmarks and the paper's experiments, one command each.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -12,6 +12,7 @@ mod files;
 mod firmware;
 mod image_size;
 mod memory_map;
+mod paper;
 mod parts;
 mod process;
 mod prove;
@@ -44,6 +45,8 @@ enum Task {
     Bench(Parts),
     /// Hide effects in simulated rigs and count how often `bowden diagnose` finds them; `prove --help` lists options
     Prove(prove::Options),
+    /// Run the experiments of the paper on the virtual bench and write host-tools/docs/paper.md; `paper --help` lists options
+    Paper(paper::Options),
     /// Build the release images for the driver board and print what they take of its memory
     Firmware,
     /// Run clippy on everything, the board's images among it; warnings are errors
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
         Ok(Cli { task: Task::Test(parts) }) => test::run(parts),
         Ok(Cli { task: Task::Bench(parts) }) => bench::run(parts),
         Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
+        Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
         Ok(Cli { task: Task::Clippy }) => clippy::run(),
         Err(error) => return usage(&error),
@@ -85,7 +89,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         .collect();
     let what = what.join(" ");
     eprintln!(
-        "xtask: {}; the tasks are demo, test, bench, prove, firmware and clippy, see `cargo xtask --help`",
+        "xtask: {}; the tasks are demo, test, bench, prove, paper, firmware and clippy, see `cargo xtask --help`",
         what.strip_prefix("error: ").unwrap_or(&what)
     );
     ExitCode::from(2)

@@ -87,7 +87,7 @@ fn real(options: &Options, data: &Path, program: &Path) -> Command {
 }
 
 /// Date and commit of what is run.
-fn provenance() -> String {
+pub fn provenance() -> String {
     let said = |program: &str, arguments: &[&str]| {
         let mut command = Command::new(program);
         process::output(command.current_dir(workspace()).args(arguments))

@@ -44,7 +44,7 @@ pub struct TrackingSetup {
 /// |---|---|
 /// | frequency | the paper's own in sections 4.1 and 4.2; section 5.2 names none |
 /// | pretension | the paper's own in section 3.2 |
-/// | friction coefficient | dry steel in plastic |
+/// | friction coefficient | dry, [`crate::friction::DRY`] |
 /// | arm, tendon, amplitude | so that the error without compensation is the paper's at both loads |
 ///
 /// Only L/EA counts, and EA is that of a solid wire of 0.8 mm. A rope has about 0.55 of that cross-section: 3.5 m here are
@@ -53,7 +53,7 @@ pub const SETUP: TrackingSetup = TrackingSetup {
     arm_m: 0.08,
     tendon_length_m: 3.5,
     pretension_n: 30.0,
-    friction_coefficient: 0.2,
+    friction_coefficient: crate::friction::DRY,
     amplitude_rad: 0.103,
     frequency_hz: 0.1,
     sheath: SheathMotionConfig::BY_HAND,
@@ -72,6 +72,8 @@ pub struct Method {
     pub mode: Mode,
     /// Parameters of the firmware.
     pub parameters: Parameters,
+    /// Error that the paper reports for it \[%\].
+    pub paper_percent: Option<f64>,
 }
 
 /// A run of a method.
@@ -97,7 +99,7 @@ pub struct TracePoint {
 }
 
 /// Points a second of a trace \[Hz\].
-const TRACE_RATE_HZ: f64 = 100.0;
+pub const TRACE_RATE_HZ: f64 = 100.0;
 
 impl TrackingSetup {
     /// The bench with this weight at its arm, sheaths at their middle wrap angle.
@@ -127,17 +129,17 @@ impl TrackingSetup {
         parameters
     }
 
-    /// Desired angle and its acceleration \[rad, rad/s²\].
-    fn desired(&self, t_s: f64) -> (f64, f64) {
-        let omega = TAU * self.frequency_hz;
-        let angle = self.amplitude_rad * (omega * t_s).sin();
-        (angle, -omega * omega * angle)
+    /// Desired angle `theta_d` \[rad\].
+    #[must_use]
+    pub fn desired_angle_rad(&self, t_s: f64) -> f64 {
+        self.amplitude_rad * (TAU * self.frequency_hz * t_s).sin()
     }
 
     /// Torque that the desired motion needs \[Nm\].
     #[must_use]
     pub fn desired_torque_nm(&self, bench: &BenchConfig, t_s: f64) -> f64 {
-        let (angle, acceleration) = self.desired(t_s);
+        let angle = self.desired_angle_rad(t_s);
+        let acceleration = -(TAU * self.frequency_hz).powi(2) * angle;
         let BenchConfig { mass_kg, arm_m, gravity_m_per_s2, load_inertia_kg_m2, .. } = bench;
         mass_kg * gravity_m_per_s2 * arm_m * angle.sin()
             + (mass_kg * arm_m * arm_m + load_inertia_kg_m2) * acceleration
@@ -190,7 +192,7 @@ pub fn track(
         let sample = TrackingSample {
             torque_desired_nm: setup.desired_torque_nm(&bench, t_s),
             torque_nm: joint.torque_out_nm(),
-            angle_desired_rad: setup.desired(t_s).0,
+            angle_desired_rad: setup.desired_angle_rad(t_s),
             angle_rad: joint.bench().theta_out_rad(),
         };
         sums.add(&sample);

@@ -7,15 +7,30 @@
 //! | module | what |
 //! |---|---|
 //! | [`driven_joint`] | bench behind encoders and converters, with the controller |
+//! | [`loop_run`] | a sine at the input pulley, recorded |
+//! | [`friction`] | friction coefficients dry and greased |
+//! | [`torque_phases`] | section 3.2, Fig. 4 |
+//! | [`lubrication_and_radius`] | section 4.1, Fig. 5 to 8 |
+//! | [`efficiency`] | section 4.2, Fig. 9 |
 //! | [`sheath_motion`] | the sheaths moved at random |
 //! | [`tracking_error`] | average torque tracking error, position error |
 //! | [`disturbed_tracking`] | section 5.2, Fig. 11 and 12: setup and runner |
 //! | [`tracking_methods`] | the ways to control the joint that are compared there |
+//! | [`tracking_prediction`] | what the equations make of it |
+//! | [`page`], [`plots`] | `host-tools/docs/paper.md` and its figures |
 #![forbid(unsafe_code)]
 
 pub mod disturbed_tracking;
 pub mod driven_joint;
+pub mod efficiency;
 pub mod error;
+pub mod friction;
+pub mod loop_run;
+pub mod lubrication_and_radius;
+pub mod page;
+pub mod plots;
 pub mod sheath_motion;
+pub mod torque_phases;
 pub mod tracking_error;
 pub mod tracking_methods;
+pub mod tracking_prediction;

@@ -1,47 +1,55 @@
-//! `cargo xtask paper`: runs the experiments and prints their tables beside the paper's claims.
+//! `cargo xtask paper`: runs the paper's experiments, prints their tables beside its claims, and writes the page.
 #![forbid(unsafe_code)]
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use bowden_paper::disturbed_tracking::SETUP;
 use bowden_paper::error::ExperimentError;
-use bowden_paper::tracking_methods::{LOADS, errors_over_seeds, methods};
+use bowden_paper::page::{self, Section};
+use bowden_paper::{efficiency, lubrication_and_radius, torque_phases};
+use clap::Parser;
 
-/// Motions of the sheaths that the errors are reported on: none of those that constants were fixed on.
-const SEEDS: [u64; 10] = [4, 5, 6, 7, 8, 9, 10, 11, 12, 13];
+/// Run the experiments of Wu et al., Sensors 2020, 20(5), 1301, on the virtual bench under the firmware's control
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask paper", args_override_self = true)]
+#[command(after_help = "Exit status: 0 done, 1 failed, 2 bad usage.")]
+struct Options {
+    /// Page to write; its figures go to the folder beside it that has its name. Without it, tables are printed only
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    /// Date and commit that the page names
+    #[arg(long, value_name = "TEXT", default_value = "date and commit not given")]
+    provenance: String,
+}
 
 fn main() -> ExitCode {
-    match run() {
+    match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("paper: {error}");
+        Err(reason) => {
+            eprintln!("paper: {reason}");
             ExitCode::FAILURE
         }
     }
 }
 
-fn run() -> Result<(), ExperimentError> {
-    println!(
-        "Section 5.2: tracking while the sheaths are moved; median (least to largest) over {} runs",
-        SEEDS.len()
-    );
-    for load in &LOADS {
-        let claims = [Some(load.uncompensated_percent), Some(load.compensated_percent), None, None];
-        for (method, claim) in methods(&SETUP, load).into_iter().zip(claims) {
-            let errors = errors_over_seeds(&SETUP, load.mass_kg, method, &SEEDS)?;
-            let torque = errors.torque_percent;
-            println!(
-                "{:>4} kg  {:<34} paper {:>8}  here {:6.2} % ({:.2} to {:.2})  angle {:5.1} mrad RMS, {:5.1} largest",
-                load.mass_kg,
-                errors.method.name,
-                claim.map_or(String::new(), |claim| format!("{claim} %")),
-                torque.median,
-                torque.least,
-                torque.largest,
-                1e3 * errors.angle_rms_rad.median,
-                1e3 * errors.angle_largest_rad.largest,
-            );
-        }
+fn run(options: &Options) -> Result<(), String> {
+    let told = |error: ExperimentError| error.to_string();
+    let mut sections = Vec::new();
+    let mut add = |section: Section| {
+        println!("{}\n\n{}", section.heading, section.table());
+        sections.push(section);
+    };
+    add(page::segments::section(&torque_phases::torque_loop().map_err(told)?)?);
+    add(page::gaps::section(&lubrication_and_radius::all().map_err(told)?)?);
+    let panels: Result<Vec<_>, _> = efficiency::panels()
+        .into_iter()
+        .map(|panel| efficiency::run_panel(&panel).map(|runs| (panel, runs)))
+        .collect();
+    add(page::lift::section(&panels.map_err(told)?)?);
+    add(page::tracking::section()?);
+    if let Some(path) = &options.page {
+        page::write(&sections, &options.provenance, path)?;
+        println!("{}", path.display());
     }
     Ok(())
 }

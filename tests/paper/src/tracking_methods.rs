@@ -22,7 +22,7 @@ pub struct PaperLoad {
     /// The same with compensation \[%\].
     pub compensated_percent: f64,
     /// Time in which the compensation follows the encoders here \[s\]: the best of 0.05, 0.07, 0.1, 0.15 and 0.2 s on
-    /// seeds 1 and 2.
+    /// seeds 1 to 3.
     pub encoder_time_s: f32,
 }
 
@@ -42,6 +42,7 @@ pub fn uncompensated(setup: &TrackingSetup, load: &PaperLoad) -> Method {
         sensors: "input encoder, input tensions",
         mode: Mode::Position,
         parameters,
+        paper_percent: Some(load.uncompensated_percent),
     }
 }
 
@@ -56,6 +57,7 @@ pub fn compensated(setup: &TrackingSetup, load: &PaperLoad) -> Method {
         sensors: "both encoders, input tensions",
         mode: Mode::Position,
         parameters,
+        paper_percent: Some(load.compensated_percent),
     }
 }
 
@@ -72,6 +74,7 @@ pub fn torque_loop(setup: &TrackingSetup, load: &PaperLoad, friction_feedforward
         sensors: "input encoder, output tensions",
         mode: Mode::Torque,
         parameters,
+        paper_percent: None,
     }
 }
 

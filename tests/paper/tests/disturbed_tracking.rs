@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use bowden_paper::disturbed_tracking::{Method, SETUP, TrackingRun, TrackingSetup, track};
 use bowden_paper::tracking_methods::{LOADS, PaperLoad, compensated, torque_loop, uncompensated};
+use bowden_paper::tracking_prediction::predicted_error_percent;
 
 /// A motion of the sheaths that no constant was fixed on.
 const SEED: u64 = 4;
@@ -30,35 +31,27 @@ fn errors_before_and_after_compensation_are_the_papers() {
     }
 }
 
-/// The error without compensation from Eq. (24) alone: `theta_out` is the play of `theta_d` less the stretch.
 #[test]
 fn the_equations_predict_the_error_before_compensation() {
     for load in &LOADS {
-        let setup = shorter();
-        let traced = run(load, &uncompensated(&SETUP, load));
-        let bench = setup.bench(load.mass_kg);
-        let weight_nm = bench.mass_kg * bench.gravity_m_per_s2 * bench.arm_m;
-        let (mut theta_out, mut error_nm, mut wanted_nm) = (0.0_f64, 0.0, 0.0);
-        for point in &traced.trace {
-            // Mean of both sheaths: their difference is small.
-            let wrap = f64::midpoint(point.wrap_angle_rad[0], point.wrap_angle_rad[1]);
-            let half = 0.5 * setup.friction_coefficient * wrap;
-            let strain = setup.tendon_length_m / bench.axial_stiffness_n;
-            let stretch = strain * half.tanh() / (2.0 * half * bench.output_radius_m.powi(2));
-            let friction = setup.pretension_n * strain * half.tanh() / bench.output_radius_m;
-            // Slip: theta_out = theta_d - stretch m g l theta_out -+ friction; between the two limits it stands.
-            let limit =
-                |sign: f64| (point.sample.angle_desired_rad + sign * friction) / (1.0 + stretch * weight_nm);
-            theta_out = theta_out.clamp(limit(-1.0), limit(1.0));
-            error_nm += (point.sample.torque_desired_nm - weight_nm * theta_out.sin()).abs();
-            wanted_nm += point.sample.torque_desired_nm.abs();
-        }
-        let predicted = 100.0 * error_nm / wanted_nm;
-        println!("{} kg: {predicted} % predicted, {:?}", load.mass_kg, traced.errors);
-        // What the equations leave out: the fronts that travel while (24) has the joint stand (4 % of the dead zone), the
-        // start from rest, and sheaths that move while the joint stands.
-        assert!((predicted - traced.errors.torque_percent).abs() < BAND_PERCENT, "{predicted}");
+        let measured = run(load, &uncompensated(&SETUP, load)).errors.torque_percent;
+        let predicted = predicted_error_percent(&shorter(), load.mass_kg, None, SEED).expect("in range");
+        println!("{} kg: {predicted} % predicted, {measured} %", load.mass_kg);
+        // What the equations leave out: fronts that travel while (24) has the joint stand, 4 % of a dead zone of up to 45
+        // mrad; and a friction angle up to 3 % smaller, because the bench's sheaths are straight at their ends.
+        assert!((predicted - measured).abs() < 2.5, "{predicted} {measured}");
     }
+}
+
+/// At mu = 0 the play closes and the lag is `c m g l` in phase: the error is `c m g l/(1 + c m g l)` of the torque.
+#[test]
+fn without_friction_the_predicted_error_is_that_of_the_stretch() {
+    let setup = TrackingSetup { friction_coefficient: 0.0, ..shorter() };
+    let predicted = predicted_error_percent(&setup, 2.5, None, SEED).expect("in range");
+    let stretch = 3.5 / (2.0 * 72_900.0 * 0.015 * 0.015) * 2.5 * 9.81 * 0.08;
+    let expected = 100.0 * stretch / (1.0 + stretch);
+    // Inertia takes 0.3 % off the torque that is asked for, the sine of the angle is within 0.2 %.
+    assert!((predicted - expected).abs() < 0.5, "{predicted} {expected}");
 }
 
 #[test]
