@@ -8,6 +8,7 @@
 //! range (flag [`Limit::ReferenceRange`]) and follows with limited speed (flag [`Limit::ReferenceSpeed`]).
 
 pub mod oscillator;
+pub mod shaper;
 
 use bowden_link::message::Shape;
 use bowden_link::{Limit, Limits};
