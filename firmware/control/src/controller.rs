@@ -262,12 +262,17 @@ impl Controller {
             self.loops = Loops::default();
         }
         let config = &self.config;
-        let bounds = match (homing, torque_mode) {
-            (true, _) => &config.homing_bounds,
-            (false, false) => &config.angle_bounds,
-            (false, true) => &config.torque_bounds,
+        let mut bounds = if torque_mode { config.torque_bounds } else { config.angle_bounds };
+        if homing {
+            bounds.range = [i32::MIN, i32::MAX];
+            bounds.limits.speed = config.homing_speed;
+        }
+        let window = if torque_mode {
+            config.torque_window.at(config.angle_bounds.range, bounds.range, readings.theta[1])
+        } else {
+            bounds.range
         };
-        let reference = self.reference.step(bounds, inbox, limits);
+        let reference = self.reference.step(&bounds, window, inbox, limits);
         let (torque, command) = if torque_mode {
             (Self::torque(config, &mut self.loops, readings, &reference, limits), readings.theta[0])
         } else {
@@ -298,16 +303,8 @@ impl Controller {
         reference: &ReferenceOutput,
         limits: &mut Limits,
     ) -> Torque {
-        let mut wanted = Torque::from_bits(reference.value_bits);
-        // A free joint would run away under a torque; it is not pushed out of its range.
-        let [low, high] = config.angle_bounds.range.map(Angle::from_bits);
-        let theta = readings.theta[1];
-        if (theta > high && wanted > Torque::ZERO) || (theta < low && wanted < Torque::ZERO) {
-            wanted = Torque::ZERO;
-            limits.insert(Limit::ReferenceRange);
-        }
         let input = TorqueInput {
-            wanted,
+            wanted: Torque::from_bits(reference.value_bits),
             rate_sign: reference.change.signum() as i32,
             measured: readings.sheath.torque_out,
             torque_in: readings.measured_load,

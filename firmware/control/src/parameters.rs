@@ -5,13 +5,18 @@
 
 mod configure;
 mod groups;
+mod reach;
+mod reachable;
 mod table;
 
 pub use configure::{ReferenceConfig, TickConfig, reference_config, tick_config};
 pub use groups::{
-    Bounds, Bridge, Compensation, Control, Encoder, Encoders, Loops, Motor, Pulleys, References, Sheath,
-    Supervision, Tendon, TensionChannel, Tensions,
+    Bounds, Bridge, Compensation, Control, Encoder, Encoders, Load, Loops, Motor, Pulleys, References,
+    Sheath, Supervision, Tendon, TensionChannel, Tensions,
 };
+
+pub use reach::Reach;
+pub use reachable::{Quantity, Unreachable, check_reference};
 
 use bowden_link::message::Refusal;
 
@@ -58,6 +63,8 @@ pub struct Parameters {
     pub tendon: Tendon,
     /// Both sheaths.
     pub sheath: Sheath,
+    /// What hangs on the joint.
+    pub load: Load,
     /// Position and torque loop.
     pub controller: Loops,
     /// Compensator.
@@ -102,6 +109,7 @@ impl Default for Parameters {
             pulley: Pulleys::default(),
             tendon: Tendon::default(),
             sheath: Sheath::default(),
+            load: Load::default(),
             controller: Loops::default(),
             compensator: Compensation::default(),
             reference: References::default(),
@@ -358,7 +366,7 @@ mod tests {
                 }
             }
         }
-        assert!(made > 150, "{made} of 170");
+        assert!(made > 160, "{made} of 180");
         // All at once.
         for end in [|s: &Specification| s.minimum, |s: &Specification| s.maximum] {
             let mut parameters = Parameters::default();
@@ -371,7 +379,7 @@ mod tests {
 
     #[test]
     fn the_configuration_is_small_enough_for_a_queue() {
-        assert!(size_of::<TickConfig>() < 768, "{} bytes", size_of::<TickConfig>());
+        assert!(size_of::<TickConfig>() < 832, "{} bytes", size_of::<TickConfig>());
         assert!(size_of::<ReferenceConfig>() <= 32, "{} bytes", size_of::<ReferenceConfig>());
     }
 

@@ -5,13 +5,13 @@
 pub mod batcher;
 pub mod store;
 
-use bowden_link::message::{Boot, Goal, Greeting, Parameter, Provocation, Refusal, Status};
+use bowden_link::message::{Boot, Goal, Greeting, Mode, Parameter, Provocation, Reference, Refusal, Status};
 use bowden_link::{
     Fault, FaultRecord, FromBoard, Limits, PROTOCOL_VERSION, Request, SCHEMA, Sample, State, ToBoard,
 };
 use heapless::String;
 
-use crate::parameters::Parameters;
+use crate::parameters::{Parameters, check_reference};
 use crate::reference::reference_config;
 use crate::supervisor::allows;
 use crate::tick::Command;
@@ -98,6 +98,10 @@ pub struct Service {
     bad_frames: u32,
     /// Number of the request whose reference points were taken last.
     streamed: Option<u16>,
+    /// Reference that waits for the next run.
+    waiting: Option<Reference>,
+    /// Mode of the run that was asked for last.
+    mode: Option<Mode>,
 }
 
 impl Service {
@@ -117,6 +121,8 @@ impl Service {
             heard_ms: 0,
             bad_frames: 0,
             streamed: None,
+            waiting: None,
+            mode: None,
         }
     }
 
@@ -166,9 +172,8 @@ impl Service {
             ToBoard::ReadParameter(index) => self.parameter(*index),
             ToBoard::WriteParameter { index, value } => self.write(*index, *value, port),
             ToBoard::DefaultParameters => self.adopt(Parameters::default(), port),
-            ToBoard::Enter(goal) => Self::enter(*goal, port),
-            ToBoard::SetReference(reference) => reference_config(&self.parameters, *reference)
-                .and_then(|config| send(port, Command::SetReference(config))),
+            ToBoard::Enter(goal) => self.enter(*goal, port),
+            ToBoard::SetReference(reference) => self.refer(*reference, port),
             ToBoard::StreamPoints(points) => self.stream(request.sequence, points, port),
             ToBoard::Telemetry(on) => {
                 self.telemetry = *on;
@@ -254,12 +259,39 @@ impl Service {
         Ok(done)
     }
 
-    fn enter(goal: Goal, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+    /// A run is refused whose reference the joint cannot do in its mode: nothing has moved yet.
+    fn enter(&mut self, goal: Goal, port: &mut impl Port) -> Result<FromBoard, Refusal> {
         let state = port.view().state;
         if !allows(state, goal) {
             return Err(Refusal::WrongState(state));
         }
-        send(port, Command::Enter(goal))
+        let mode = if let Goal::Run(mode) = goal { Some(mode) } else { None };
+        if let (Some(mode), Some(reference)) = (mode, self.waiting) {
+            check_reference(&self.parameters, mode, reference)?;
+        }
+        let done = send(port, Command::Enter(goal))?;
+        if mode.is_some() {
+            self.waiting = None;
+        }
+        self.mode = mode;
+        Ok(done)
+    }
+
+    /// While the joint runs, the mode says what the reference means; before, it is refused if no mode could do it.
+    fn refer(&mut self, reference: Reference, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        let check = |mode: Mode| check_reference(&self.parameters, mode, reference);
+        let runs = matches!(port.view().state, State::Ready | State::Run);
+        let running = self.mode.filter(|_| runs);
+        match running {
+            Some(mode) => check(mode)?,
+            None => check(Mode::Position).or_else(|position| check(Mode::Torque).map_err(|_| position))?,
+        }
+        let config = reference_config(&self.parameters, reference)?;
+        let done = send(port, Command::SetReference(config))?;
+        if running.is_none() {
+            self.waiting = Some(reference);
+        }
+        Ok(done)
     }
 
     /// All points or none. A request that comes again under its number, because its answer was lost, appends nothing

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use bowden_control::parameters::Parameters;
 use bowden_control::service::{Identity, Port, Reply, Service, View};
 use bowden_control::tick::Command;
-use bowden_link::message::{Boot, Goal, Mode, Provocation, Refusal};
+use bowden_link::message::{Boot, Goal, Mode, Provocation, Reference, Refusal, Shape};
 use bowden_link::{Fault, FromBoard, PROTOCOL_VERSION, Request, Sample, State, ToBoard};
 
 /// A tick that takes up to four commands and eight points.
@@ -167,4 +167,38 @@ fn states_that_do_not_follow_are_refused() {
     tick.view.state = State::Ready;
     assert_eq!(asked(&mut service(), &mut tick, 2, run), Reply::Say(FromBoard::Done));
     assert_eq!(tick.commands, [Command::Enter(Goal::Run(Mode::Position))]);
+}
+
+#[test]
+fn a_reference_that_the_joint_cannot_do_is_refused_before_the_run() {
+    let sine = |amplitude, frequency_hz| {
+        let shape = Shape::Sine;
+        ToBoard::SetReference(Reference::Generated { shape, amplitude, offset: 0.0, frequency_hz })
+    };
+    let run = |mode| ToBoard::Enter(Goal::Run(mode));
+    let out_of_range = |reply: Reply, value: f32| match reply {
+        Reply::Say(FromBoard::Refused(Refusal::OutOfRange { got, minimum, maximum })) => {
+            assert_eq!((got, minimum), (value, -maximum));
+            maximum
+        }
+        reply => panic!("{reply:?}"),
+    };
+    let (mut service, mut tick) = (service(), tick_in(State::Ready));
+    // Beyond the range in both modes.
+    let largest = out_of_range(asked(&mut service, &mut tick, 1, sine(99.0, 0.5)), 99.0);
+    assert!((0.5..1.2).contains(&largest), "{largest}");
+    assert!(tick.commands.is_empty());
+    // 0.8 rad, but not 0.8 N·m: only the run says which.
+    assert_eq!(asked(&mut service, &mut tick, 2, sine(0.8, 0.5)), Reply::Say(FromBoard::Done));
+    tick.commands.clear();
+    let largest = out_of_range(asked(&mut service, &mut tick, 3, run(Mode::Torque)), 0.8);
+    assert!((0.3..0.65).contains(&largest), "{largest}");
+    assert!(tick.commands.is_empty());
+    assert_eq!(asked(&mut service, &mut tick, 4, run(Mode::Position)), Reply::Say(FromBoard::Done));
+    // A running joint knows: 0.8 rad once more at another frequency, of which there is too much at 5 Hz.
+    tick.view.state = State::Run;
+    assert_eq!(asked(&mut service, &mut tick, 5, sine(0.8, 0.4)), Reply::Say(FromBoard::Done));
+    let largest = out_of_range(asked(&mut service, &mut tick, 6, sine(0.8, 5.0)), 0.8);
+    assert_eq!(asked(&mut service, &mut tick, 7, sine(largest, 5.0)), Reply::Say(FromBoard::Done));
+    assert_eq!(tick.commands.len(), 3);
 }

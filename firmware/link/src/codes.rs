@@ -208,11 +208,13 @@ pub enum Limit {
     FrameRepaired = 1 << 7,
     /// The magnet of an encoder is at the edge of its range.
     MagnetMarginal = 1 << 8,
+    /// The acceleration or the jerk of the reference is limited.
+    ReferenceAcceleration = 1 << 9,
 }
 
 impl Limit {
     /// Every limit.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Duty,
         Self::Current,
         Self::ReferenceSpeed,
@@ -222,6 +224,7 @@ impl Limit {
         Self::StreamEmpty,
         Self::FrameRepaired,
         Self::MagnetMarginal,
+        Self::ReferenceAcceleration,
     ];
 
     /// In words.
@@ -237,6 +240,7 @@ impl Limit {
             Self::StreamEmpty => "reference stream empty, last one held",
             Self::FrameRepaired => "encoder frame repaired",
             Self::MagnetMarginal => "encoder magnet marginal",
+            Self::ReferenceAcceleration => "reference acceleration limited",
         }
     }
 }

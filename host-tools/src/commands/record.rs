@@ -62,7 +62,7 @@ impl RecordArguments {
     /// Runs and records.
     ///
     /// # Errors
-    /// Exit status 2, if an output or the port is not usable; 1, if the board refused, a fault stopped the joint, or the
+    /// Exit status 2, if an output or the port is not usable or the joint cannot do the reference; 1, if the board refused, a fault stopped the joint, or the
     /// link broke. What was recorded until then is kept.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
         let format = Format::for_output(&self.out)?;
@@ -94,6 +94,7 @@ impl RecordArguments {
             parameters.write(&mut client, &parameters.load(path)?)?;
         }
         let mut session = Session::new(client)?;
+        self.course.check(&course, &session.parameters().control())?;
         progress.stage("self test and pretension check", 0);
         session.ready(stop)?;
         if self.home {

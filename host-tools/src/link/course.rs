@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use bowden_control::parameters::{Parameters, Quantity, Reach, check_reference};
 use bowden_link::message::{Mode, Reference, Shape};
 use bowden_model::channel::Channel;
 
@@ -115,6 +116,65 @@ impl CourseArguments {
     }
 }
 
+impl CourseArguments {
+    /// Checks that the joint of these parameters can do the course, as the board does before it runs.
+    ///
+    /// # Errors
+    /// One line with what can be done.
+    pub fn check(&self, course: &Course, parameters: &Parameters) -> Result<(), Failure> {
+        let unit = match self.mode {
+            ModeName::Position => "rad",
+            ModeName::Torque => "N·m",
+        };
+        match course {
+            Course::OnBoard(reference) => {
+                let Err(no) = check_reference(parameters, self.mode(), *reference) else { return Ok(()) };
+                let (got, minimum, maximum) = (no.got, rounded(no.minimum), rounded(no.maximum));
+                Err(Failure::bad_input(match no.quantity {
+                    Quantity::Amplitude => format!(
+                        "--amplitude {got}: the joint can do {maximum} {unit} at most at {} Hz around {} {unit}; lower it or \
+                         the frequency",
+                        self.frequency, self.offset
+                    ),
+                    Quantity::Offset | Quantity::Value => format!(
+                        "--offset {got}: the joint can do {minimum} to {maximum} {unit}; choose a value within it"
+                    ),
+                    Quantity::Frequency => format!(
+                        "--frequency {got}: the board can do {minimum} to {maximum} Hz; choose one within it"
+                    ),
+                }))
+            }
+            Course::Streamed(track) => {
+                let reach = Reach::new(parameters);
+                let [minimum, maximum] = match self.mode {
+                    ModeName::Position => reach.angle,
+                    ModeName::Torque => [-reach.torque, reach.torque],
+                };
+                let Some((t_s, got)) = track.first_outside(minimum.into(), maximum.into()) else {
+                    return Ok(());
+                };
+                Err(Failure::bad_input(format!(
+                    "--reference {}: {got} {unit} at {t_s} s, the joint can do {} to {} {unit}; scale the reference",
+                    self.reference.display(),
+                    rounded(minimum),
+                    rounded(maximum)
+                )))
+            }
+        }
+    }
+}
+
+/// Four digits, towards zero, so that what is said can be done.
+fn rounded(value: f32) -> f64 {
+    let value = f64::from(value);
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let digits = 3 - value.abs().log10().floor() as i32;
+    let scale = 10_f64.powi(digits);
+    (value * scale).trunc() / scale
+}
+
 /// A reference over time, linear between its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
@@ -175,6 +235,12 @@ impl Track {
         self.t_s.last().copied().unwrap_or(0.0)
     }
 
+    /// Time and value of the first sample that is not within these, s.
+    fn first_outside(&self, minimum: f64, maximum: f64) -> Option<(f64, f64)> {
+        let mut samples = self.t_s.iter().copied().zip(self.values.iter().copied());
+        samples.find(|(_, value)| *value < minimum || *value > maximum)
+    }
+
     /// Point `index` at `rate_hz`, up to the end of the track.
     pub fn point(&self, index: u64, rate_hz: f64) -> Option<f32> {
         let t_s = index as f64 / rate_hz;
@@ -193,6 +259,16 @@ impl Track {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn limits_are_said_with_four_digits_that_can_be_done() {
+        for (value, expected) in
+            [(0.873_13, 0.8731), (99.999, 99.99), (0.005_208_65, 0.005_208), (-0.873_19, -0.8731)]
+        {
+            assert!((rounded(value) - expected).abs() < 1e-9, "{value}: {}", rounded(value));
+        }
+        assert_eq!(rounded(0.0), 0.0);
+    }
 
     #[test]
     fn a_track_is_resampled_on_straight_lines() {

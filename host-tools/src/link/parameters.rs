@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
+use bowden_control::parameters::Parameters;
 use bowden_link::message::{Parameter, Refusal};
 use toml::de::{DeTable, DeValue};
 
@@ -132,6 +133,18 @@ impl ParameterSet {
             );
         }
         text
+    }
+
+    /// The set as the control takes it, to ask what the board will say; parameters that the board does not have are at
+    /// their default.
+    pub fn control(&self) -> Parameters {
+        let mut parameters = Parameters::default();
+        for parameter in &self.parameters {
+            if let Some(index) = Parameters::index_of(&parameter.name) {
+                parameters.set_unchecked(index, parameter.value);
+            }
+        }
+        parameters
     }
 
     /// Where a recording came from, as a format with room for it keeps it.

@@ -6,14 +6,15 @@
 use bowden_link::message::{Reference, Refusal};
 use micromath::F32Ext;
 
-use super::Parameters;
+use super::{Parameters, Reach};
 use crate::compensator::Compensator;
 use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::encoder::multi_turn::StepLimit;
 use crate::encoder::stuck::StuckConfig;
 use crate::encoder::{CountRaw, EncoderConfig};
 use crate::observer::ObserverConfig;
-use crate::reference::{Origin, ReferenceBounds};
+use crate::reference::shaper::ShaperLimits;
+use crate::reference::{Origin, ReferenceBounds, TorqueWindow};
 use crate::scale::{Angle, Code, Current, Gain, Quantity, Ratio, Speed, Tension, Torque, Voltage, Weight};
 use crate::sheath::{Fitted, SheathConfig};
 use crate::supervisor::SupervisorConfig;
@@ -41,8 +42,10 @@ pub struct TickConfig {
     pub(crate) torque: TorqueConfig,
     pub(crate) drive: DriveConfig,
     pub(crate) angle_bounds: ReferenceBounds,
-    pub(crate) homing_bounds: ReferenceBounds,
+    /// Largest speed of homing, 2⁻³² a tick.
+    pub(crate) homing_speed: u32,
     pub(crate) torque_bounds: ReferenceBounds,
+    pub(crate) torque_window: TorqueWindow,
     pub(crate) supervisor: SupervisorConfig,
 }
 
@@ -67,8 +70,9 @@ impl TickConfig {
             torque,
             drive,
             angle_bounds,
-            homing_bounds,
+            homing_speed,
             torque_bounds,
+            torque_window,
             supervisor,
         } = other;
         self.rate_hz = *rate_hz;
@@ -87,8 +91,9 @@ impl TickConfig {
         self.torque = *torque;
         self.drive = *drive;
         self.angle_bounds = *angle_bounds;
-        self.homing_bounds = *homing_bounds;
+        self.homing_speed = *homing_speed;
         self.torque_bounds = *torque_bounds;
+        self.torque_window = *torque_window;
         self.supervisor = *supervisor;
     }
 }
@@ -110,12 +115,20 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
     parameters.validate()?;
     let period_s = 1.0 / parameters.tick_rate_hz();
     let ratio = parameters.pulley.output_radius / parameters.pulley.input_radius;
-    let bounds = |minimum: f32, maximum: f32, rate: f32| ReferenceBounds {
-        range: [Angle::from_f32(minimum).to_bits(), Angle::from_f32(maximum).to_bits()],
-        step: phase_step(rate * period_s),
+    let reach = Reach::new(parameters);
+    let shaped = |speed: f32, acceleration: f32, gravity: f32, jerk: f32| {
+        /// Scale of the shaper.
+        const ONE: f32 = (1_u64 << 40) as f32;
+        let square_s2 = period_s * period_s;
+        let acceleration = [acceleration, gravity].map(|value| value * square_s2 * ONE);
+        ShaperLimits::new(
+            phase_step(speed * period_s),
+            acceleration[0],
+            acceleration[1],
+            jerk * square_s2 * period_s * ONE,
+        )
     };
-    let limits = &parameters.limits;
-    let angle = |rate| bounds(limits.angle_minimum, limits.angle_maximum, rate);
+    let range = |ends: [f32; 2]| ends.map(|end| Angle::from_f32(end).to_bits());
     Ok(TickConfig {
         rate_hz: parameters.tick_rate_hz() as u16,
         encoder: [encoder(parameters, false)?, encoder(parameters, true)?],
@@ -135,12 +148,21 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         position: position(parameters, period_s)?,
         torque: torque(parameters, period_s)?,
         drive: drive(parameters)?,
-        angle_bounds: angle(limits.speed),
-        homing_bounds: ReferenceBounds {
-            range: [i32::MIN, i32::MAX],
-            ..angle(parameters.supervisor.homing_speed)
+        angle_bounds: ReferenceBounds {
+            range: range(reach.angle),
+            limits: shaped(reach.speed, reach.acceleration, reach.gravity, reach.jerk),
         },
-        torque_bounds: bounds(-limits.torque, limits.torque, limits.torque_rate),
+        homing_speed: phase_step(parameters.supervisor.homing_speed.min(reach.speed) * period_s),
+        torque_bounds: ReferenceBounds {
+            range: range([-reach.torque, reach.torque]),
+            limits: shaped(reach.torque_rate, reach.torque_acceleration, 0.0, reach.torque_jerk),
+        },
+        torque_window: TorqueWindow {
+            // A joint at its largest speed sees the torque change at its largest rate.
+            slope: gain(reach.torque_rate / reach.speed, "limits.torque_rate")?,
+            left: [-reach.angle[0], reach.angle[1]]
+                .map(|outward| Torque::from_f32(reach.left_torque(outward))),
+        },
         supervisor: supervisor(parameters, period_s),
     })
 }

@@ -126,6 +126,17 @@ pub struct Sheath {
     pub exponent_maximum: f32,
 }
 
+/// What hangs on the joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Mass m at the end of the arm, kg.
+    pub mass: f32,
+    /// Distance l of the mass from the axis, m.
+    pub arm: f32,
+    /// Inertia beyond m l², kg·m².
+    pub inertia: f32,
+}
+
 /// Position and torque loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loops {
@@ -188,6 +199,10 @@ pub struct Bounds {
     pub angle_maximum: f32,
     /// Largest speed of the joint's reference, rad/s.
     pub speed: f32,
+    /// Largest acceleration of the joint's reference, rad/s²; [`super::Reach`] may be lower.
+    pub acceleration: f32,
+    /// Largest jerk of the joint's reference, rad/s³; [`super::Reach`] may be lower.
+    pub jerk: f32,
     /// Largest torque reference, N·m.
     pub torque: f32,
     /// Largest rate of the torque reference, N·m/s.

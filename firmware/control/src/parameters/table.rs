@@ -49,6 +49,9 @@ parameter_table! {
     tendon.pretension, "N", 0.1, 1000.0, 30.0, true;
     sheath.friction_coefficient, "", 0.0, 2.0, 0.12, true;
     sheath.wrap_angle, "rad", 0.0, 30.0, core::f32::consts::PI, true;
+    load.mass, "kg", 0.0, 100.0, 2.5, true;
+    load.arm, "m", 0.0, 2.0, 0.03, true;
+    load.inertia, "kg·m²", 0.0, 10.0, 0.0, true;
     controller.bandwidth, "Hz", 0.1, 50.0, 8.0, true;
     controller.damping, "", 0.2, 5.0, 1.0, true;
     controller.integral_time, "s", 0.01, 100.0, 0.1, true;
@@ -70,6 +73,8 @@ parameter_table! {
     limits.angle_minimum, "rad", -100.0, 100.0, -1.2, true;
     limits.angle_maximum, "rad", -100.0, 100.0, 1.2, true;
     limits.speed, "rad/s", 0.001, 100.0, 3.0, true;
+    limits.acceleration, "rad/s²", 1.0, 10_000.0, 300.0, true;
+    limits.jerk, "rad/s³", 1000.0, 1_000_000.0, 20_000.0, true;
     limits.torque, "N·m", 0.001, 1000.0, 0.6, true;
     limits.torque_rate, "N·m/s", 0.001, 1000.0, 5.0, true;
     limits.current, "A", 0.05, 13.0, 3.0, true;

@@ -29,6 +29,10 @@ const RISE_BITS: u32 = 4;
 /// Bits behind the point of the inverse of the jerk's mantissa.
 const INVERSE_BITS: u32 = 28;
 
+/// Steps of the jerk by which a locked goal may deviate from a steady motion in a tick: corners between the points of a
+/// stream, the grid of the goal.
+const LOCKED_STEPS: i64 = 256;
+
 /// Distance over the jerk below which the grid of ticks shows, ticks³.
 const GRID: i64 = 16;
 
@@ -75,7 +79,7 @@ impl ShaperLimits {
             inverse: ((1_u64 << (INVERSE_BITS + shift)) / u64::from(jerk.unsigned_abs())) as u32,
             shift: shift as u8,
             rise,
-            gravity: ticks(gravity).min(rise - (1 << RISE_BITS)),
+            gravity: ticks(gravity),
         }
     }
 
@@ -111,7 +115,8 @@ impl ShaperLimits {
         const FACTOR: i64 = 870_342_461;
         let angle = (value >> 20).abs().min(QUARTER);
         let sine = (((angle * (PI - angle)) >> 20) * FACTOR) >> 31;
-        i32::from(self.rise) - ((sine * i64::from(self.gravity)) >> 20) as i32
+        let left = i32::from(self.rise) - ((sine * i64::from(self.gravity)) >> 20) as i32;
+        left.max(1 << RISE_BITS)
     }
 }
 
@@ -288,14 +293,17 @@ impl Shaper {
         self.catch_up(limits, &bounds, &seen, goal)
     }
 
-    /// Whether the goal is where this tick leads without jerk, within a few steps of the jerk.
+    /// Whether the goal is where this tick leads without jerk, within a few steps of the jerk. Once locked, the value is the
+    /// goal; its speed and acceleration, as the filter knows them, must go on as steadily.
     #[inline]
     fn meets(&self, limits: &ShaperLimits, seen: &Seen, goal: i64) -> bool {
         let near = |difference: i64, steps: i64| difference.abs() <= steps * i64::from(limits.jerk);
         let speed = self.speed + self.acceleration;
+        let (value_steps, speed_steps) = if self.locked { (LOCKED_STEPS, LOCKED_STEPS) } else { (32, 12) };
         near(seen.jerk, 1)
             && near(self.acceleration - seen.acceleration, 4)
-            && (self.locked || (near(self.value + speed - goal, 32) && near(speed - seen.speed, 12)))
+            && near(speed - seen.speed, speed_steps)
+            && near(self.value + speed - goal, value_steps)
     }
 
     /// A tick that is not locked.
@@ -506,7 +514,10 @@ mod tests {
             assert!(now.acceleration.abs() <= most + jerk, "acceleration {} of {most}", now.acceleration);
             let speed = i64::from(self.limits.speed) << 8;
             assert!(now.speed.abs() <= speed + 2 * jerk, "speed {} of {speed}", now.speed);
-            if !now.locked {
+            if now.locked {
+                let deviation = now.speed - before.speed - before.acceleration;
+                assert!(deviation.abs() <= LOCKED_STEPS * jerk, "speed {deviation} of {jerk}");
+            } else {
                 assert_eq!(now.value - before.value, now.speed);
                 assert_eq!(now.speed - before.speed, now.acceleration);
                 assert!(changed.abs() <= jerk);
