@@ -6,6 +6,7 @@
 //! | [`client`] | one method a request, over any transport |
 //! | [`error`], [`losses`] | what goes wrong, and what gets lost |
 //! | [`parameters`] | the board's parameters by name, to and from a file |
+//! | [`from_rig`] | the board's parameters from what a fit or a diagnosis found |
 //! | [`session`] | from off to a running reference and back to off |
 //! | [`course`] | what the joint is to follow |
 //! | [`conversion`], [`recorder`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
@@ -14,6 +15,7 @@ pub mod client;
 pub mod conversion;
 pub mod course;
 pub mod error;
+pub mod from_rig;
 pub mod losses;
 pub mod parameters;
 pub mod recorder;

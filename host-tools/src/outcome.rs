@@ -33,6 +33,12 @@ impl Failure {
         Self { class: FailureClass::BadInput, message: one_line(&message) }
     }
 
+    /// The same failure with another clause behind its message.
+    #[must_use]
+    pub fn with_note(self, note: &impl Display) -> Self {
+        Self { class: self.class, message: format!("{}; {}", self.message, one_line(note)) }
+    }
+
     /// Class, and with it the exit status.
     pub fn class(&self) -> FailureClass {
         self.class

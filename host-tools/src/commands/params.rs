@@ -4,15 +4,20 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::print;
-use crate::link::{ParameterSet, PortArguments};
+use crate::link::from_rig::Transfer;
+use crate::link::{Client, ParameterSet, PortArguments};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
+use crate::rig::Rig;
 
 /// Arguments of `bowden params`.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "Changes act at once and last until the board is switched off; `store` writes them to its flash. Some \
-                  parameters, and `store`, need the bridge off."
+                  parameters, and `store`, need the bridge off.",
+    // `--port` may stand behind the action too. A global argument cannot be required; it is missed all the same.
+    mut_arg("port", |port| port.global(true).required(false)),
+    mut_arg("timeout", |timeout| timeout.global(true))
 )]
 pub struct ParamsArguments {
     #[command(flatten)]
@@ -42,6 +47,8 @@ enum Action {
         #[arg(value_name = "FILE.toml")]
         file: PathBuf,
     },
+    /// Set the parameters to what a rig file says, such as the `rig.diagnosed.toml` of a diagnosis
+    FromRig(FromRig),
     /// Write all parameters to a file
     Save {
         /// File to write
@@ -52,6 +59,43 @@ enum Action {
     Store,
     /// Set all parameters to their defaults
     Default,
+}
+
+#[derive(Clone, Debug, clap::Args)]
+struct FromRig {
+    /// Rig file
+    #[arg(value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// Parameters under which the rig's recordings were made, if the board's are others by now: errors of sensors are
+    /// relative to them
+    #[arg(long, value_name = "FILE.toml")]
+    recorded_with: Option<PathBuf>,
+    /// Show what would be set, and change nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl FromRig {
+    /// Shows what the rig changes, then sets it, all or nothing.
+    fn run(&self, client: &mut Client, parameters: &ParameterSet) -> Result<(), Failure> {
+        let rig = Rig::load(&self.rig)?;
+        let recorded = match &self.recorded_with {
+            Some(file) => parameters.load(file)?,
+            None => Vec::new(),
+        };
+        let transfer = Transfer::new(&rig, &self.rig.display().to_string(), parameters, &recorded)?;
+        print(&transfer.table())?;
+        let values = transfer.values();
+        let count = match values.len() {
+            1 => "1 parameter".to_owned(),
+            count => format!("{count} parameters"),
+        };
+        if self.dry_run {
+            return print(&format!("{count} would be set\n"));
+        }
+        parameters.replace(client, &values)?;
+        print(&format!("{count} set until the board is switched off; `store` keeps them\n"))
+    }
 }
 
 impl ParamsArguments {
@@ -79,6 +123,7 @@ impl ParamsArguments {
                 let values = parameters.load(file)?;
                 parameters.write(&mut client, &values)?;
             }
+            Action::FromRig(from_rig) => from_rig.run(&mut client, &parameters)?,
             Action::Save { file } => {
                 let text = parameters.to_toml();
                 output::write_file(file, |file| file.write_all(text.as_bytes()))?;

@@ -258,13 +258,49 @@ impl ParameterSet {
     /// # Errors
     /// Names the parameter and, for a conflict, the one that it contradicts; those before it stay set.
     pub fn write(&self, client: &mut Client, values: &[(u16, f32)]) -> Result<(), Failure> {
+        self.write_noting(client, values, &mut Vec::new())
+    }
+
+    /// Sets parameters like [`ParameterSet::write`], all of them or none.
+    ///
+    /// # Errors
+    /// As [`ParameterSet::write`]; the board then has the values of this set again. If the link breaks as well, the
+    /// message says how many it could not restore.
+    pub fn replace(&self, client: &mut Client, values: &[(u16, f32)]) -> Result<(), Failure> {
+        let mut tried = Vec::new();
+        let Err(failure) = self.write_noting(client, values, &mut tried) else { return Ok(()) };
+        // Backwards, every set on the way is one that the board has accepted before.
+        let left = tried
+            .iter()
+            .rev()
+            .filter_map(|index| self.parameters.get(usize::from(*index)))
+            .filter(|parameter| client.set_parameter(parameter.index, parameter.value).is_err())
+            .count();
+        Err(failure.with_note(&match left {
+            0 => "nothing was changed".to_owned(),
+            _ => format!("{left} parameters could not be restored, see `bowden params list`"),
+        }))
+    }
+
+    /// Sets parameters; `tried` gets the index of each that may have another value now, in order.
+    fn write_noting(
+        &self,
+        client: &mut Client,
+        values: &[(u16, f32)],
+        tried: &mut Vec<u16>,
+    ) -> Result<(), Failure> {
         let mut left: Vec<(u16, f32)> = values.to_vec();
         loop {
             let before = left.len();
             let mut conflict = None;
             let mut refused = Vec::new();
             for (index, value) in left {
-                match client.set_parameter(index, value) {
+                let result = client.set_parameter(index, value);
+                // A refused value was not taken; where no answer came, it may have been.
+                if !matches!(result, Err(LinkError::Refused { .. })) {
+                    tried.push(index);
+                }
+                match result {
                     Ok(()) => {}
                     Err(LinkError::Refused { refusal: Refusal::Conflict(other), .. }) => {
                         conflict.get_or_insert((index, value, other));

@@ -349,8 +349,11 @@ impl Fake {
                 }));
             }
             ToBoard::WriteParameter { index, value } => {
-                let (_, _, minimum, maximum, _) =
+                let (name, _, minimum, maximum, _) =
                     *PARAMETERS.get(usize::from(*index)).ok_or(Refusal::NoSuchIndex)?;
+                if self.mishaps.fixed_parameter == Some(name) {
+                    return Err(Refusal::Moving);
+                }
                 if !(*value >= minimum && *value <= maximum) {
                     return Err(Refusal::OutOfRange { got: *value, minimum, maximum });
                 }

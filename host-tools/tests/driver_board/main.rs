@@ -5,6 +5,7 @@
 
 mod client;
 mod fake;
+mod from_rig;
 mod mishaps;
 mod ports;
 mod pseudo_terminal;

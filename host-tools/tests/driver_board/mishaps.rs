@@ -27,6 +27,8 @@ pub struct Mishaps {
     pub damage_batches: Option<u64>,
     /// Every n-th batch comes twice.
     pub repeat_batches: Option<u64>,
+    /// Parameter that cannot be changed.
+    pub fixed_parameter: Option<&'static str>,
     /// Ticks after the start of a run at which a tendon goes slack.
     pub slack_after: Option<u64>,
     /// Ticks after the start of a run at which the board starts again.
