@@ -7,6 +7,7 @@ use bowden_link::message::Mode;
 use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
 
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
+use crate::correction::lead::Lead;
 use crate::drive::{Loops, PositionInput, TorqueInput};
 use crate::encoder::EncoderChannel;
 use crate::encoder::stuck::StuckWatch;
@@ -36,6 +37,7 @@ pub struct Controller {
     /// The bridge goes on in this tick.
     starts: bool,
     compensator: CompensatorState,
+    lead: Lead,
     loops: Loops,
     sheath: SheathEstimate,
     limits: Limits,
@@ -83,6 +85,7 @@ impl Controller {
             waiting: None,
             starts: false,
             compensator: CompensatorState::default(),
+            lead: Lead::default(),
             loops: Loops::default(),
             sheath: SheathEstimate::default(),
             limits: Limits(0),
@@ -174,7 +177,7 @@ impl Controller {
         let config = &self.config;
         let observed = [0, 1].map(|n: usize| self.encoders[n].observe(&config.encoder[n], &input.encoder[n]));
         let counts = observed.map(|encoder| encoder.position_counts);
-        let theta = observed.map(|encoder| encoder.angle);
+        let theta = [0, 1].map(|n: usize| config.eccentricity[n].corrected(observed[n].angle));
         if observed.iter().any(|encoder| encoder.repaired) {
             limits.insert(Limit::FrameRepaired);
         }
@@ -259,6 +262,7 @@ impl Controller {
                 self.reference.follow(waiting);
             }
             self.compensator = CompensatorState::starting_at(&self.config.compensator, &compensation);
+            self.lead = Lead::default();
             self.loops = Loops::default();
         }
         let config = &self.config;
@@ -278,19 +282,24 @@ impl Controller {
         } else {
             compensation.theta_d = Angle::from_bits(reference.value_bits);
             compensation.omega_d = reference.speed(config.rate_hz);
+            let own =
+                config.joint.torque(config.joint.direction.of(compensation.omega_d), compensation.theta_d);
+            compensation.torque_out = compensation.torque_out.minus(own);
             let compensated = compensate(&config.compensator, &mut self.compensator, &compensation);
             if compensated.limited {
                 limits.insert(Limit::Compensation);
             }
+            let (lead, lead_speed) = self.lead.follow(&config.lead, config.joint.stretch(own));
+            let command = compensated.theta_c.plus(lead);
             let position = PositionInput {
-                command: compensated.theta_c,
-                command_speed: config.speed_ratio.apply(compensation.omega_d),
+                command,
+                command_speed: config.speed_ratio.apply(compensation.omega_d).plus(lead_speed),
                 acceleration: reference.acceleration(config.rate_hz),
                 measured: readings.theta[0],
                 motion: readings.motion,
                 torque_in: readings.load,
             };
-            (self.loops.position(&config.position, &config.drive, &position, limits), compensated.theta_c)
+            (self.loops.position(&config.position, &config.drive, &position, limits), command)
         };
         let duty_raw = self.loops.duty(&config.drive, torque, readings.motion.speed, readings.bus, limits);
         Action { duty_raw, reference_raw: reference.value_bits, command }
@@ -303,13 +312,18 @@ impl Controller {
         reference: &ReferenceOutput,
         limits: &mut Limits,
     ) -> Torque {
+        let rate_sign = reference.change.signum() as i32;
+        let direction = loops.direction(&config.torque, &config.drive, rate_sign, readings.motion.speed);
+        let wanted = Torque::from_bits(reference.value_bits);
         let input = TorqueInput {
-            wanted: Torque::from_bits(reference.value_bits),
-            rate_sign: reference.change.signum() as i32,
+            wanted: wanted.plus(config.joint.torque(direction, readings.theta[1])),
+            rate_sign,
             measured: readings.sheath.torque_out,
-            torque_in: readings.measured_load,
+            load: readings.load,
+            measured_load: readings.measured_load,
             friction: readings.sheath.friction_torque,
-            speed: readings.motion.speed,
+            motion: readings.motion,
+            direction,
         };
         loops.torque(&config.torque, &config.drive, &input, limits)
     }

@@ -8,17 +8,22 @@
 //!
 //! | loop | law |
 //! |---|---|
-//! | position | `τ = J (k_p e + k_i ∫e dt + k_d (ω_c − ω) + α_c) + b ω + g (F1 − F3) r1`, `e = θ_c − θ`; `k_p = ω_n²`, `k_d = 2ζω_n`, `k_i = k_p/T_i` |
-//! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + k (e + ∫e dt/T_i) − d ω`, `e = (r1/r2)(T_d − T_out)`, s the sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) with the `mu K` of [`crate::sheath`]; `g M s` is low-passed |
+//! | position | `τ = J (k_p e + k_i ∫e dt + k_d (ω_c − ω) + α_c) + b ω + τ_m + g (F1 − F3) r1`, `e = θ_c − θ`; `k_p = ω_n²`, `k_d = 2ζω_n`, `k_i = k_p/T_i` |
+//! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + τ_m + k (e + ∫e dt/T_i) − d ω − d_T dT_in/dt`, `e = (r1/r2)(T_d − T_out)`, s the sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) with the `mu K` of [`crate::sheath`]; `g M s` and `dT_in/dt` are low-passed |
 //!
+//! `τ_m` is what [`crate::correction`] adds for friction and ripple of the motor; the duty gets what the bridge leaves of it.
 //! The measured input torque is fed forward, so the position loop sees the rotor alone, whatever weight and friction do.
 //! The integral rests (flag [`Limit::Integrator`]) while current or duty are at their limit and the error would push
 //! further, and while the count does not tell an error.
 
 use bowden_link::{Limit, Limits};
 
+use crate::correction::MotorCorrection;
+use crate::correction::dead_zone::DeadZone;
 use crate::observer::Motion;
-use crate::scale::{Acceleration, Angle, Current, Gain, Quantity, Speed, Sum, Torque, Voltage, Weight};
+use crate::scale::{
+    Acceleration, Angle, Current, Gain, Quantity, Share, Speed, Sum, Torque, Voltage, Weight,
+};
 
 /// Motor, gear and bridge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +42,10 @@ pub struct DriveConfig {
     pub duty_limit_raw: i16,
     /// Positive duty turns towards -θ.
     pub reversed: bool,
+    /// Friction and ripple of the motor.
+    pub correction: MotorCorrection,
+    /// Dead zone of the bridge.
+    pub dead_zone: DeadZone,
 }
 
 /// Gains of the position loop.
@@ -79,6 +88,8 @@ pub struct TorqueConfig {
     pub friction: Gain<Torque, Torque>,
     /// Low-pass of what is fed forward.
     pub friction_filter: Weight<Torque, Torque>,
+    /// The same for other friction.
+    pub direction_filter: Weight<Share, Share>,
 }
 
 /// State of both loops.
@@ -92,6 +103,8 @@ pub struct Loops {
     slow: Sum<Torque>,
     /// The reference fell when it moved last.
     falls: bool,
+    direction: Sum<Share>,
+    direction_target: Share,
     /// Sign of the output that was at a limit in the last tick, 0 if none was.
     saturated: i8,
 }
@@ -122,12 +135,16 @@ pub struct TorqueInput {
     pub rate_sign: i32,
     /// Output torque `(F2 - F4) r2`, measured or estimated.
     pub measured: Torque,
-    /// Torque that the tendons take from the input pulley, where it is measured, else 0.
-    pub torque_in: Torque,
+    /// Torque that the tendons take from the input pulley, measured or observed.
+    pub load: Torque,
+    /// The same where it is measured, else 0.
+    pub measured_load: Torque,
     /// Friction torque of the sheaths at the joint, `M`.
     pub friction: Torque,
-    /// Observed speed of the input pulley.
-    pub speed: Speed,
+    /// Observed angle and speed of the input pulley.
+    pub motion: Motion,
+    /// Direction of motion, see [`Loops::direction`].
+    pub direction: Share,
 }
 
 impl Loops {
@@ -155,6 +172,9 @@ impl Loops {
         }
         let wanted = config.acceleration_feedforward.apply(input.acceleration);
         let wanted = self.feedforward.approach(config.acceleration_filter, wanted);
+        let direction = drive.correction.direction.of(input.command_speed);
+        let motor =
+            drive.correction.torque(direction, input.command_speed, input.motion.angle, input.torque_in);
         let speed_error = input.command_speed.minus(input.motion.speed);
         let acceleration = config
             .proportional
@@ -166,7 +186,29 @@ impl Loops {
             .inertia
             .apply(acceleration)
             .plus(drive.viscous.apply(input.motion.speed))
+            .plus(motor)
             .plus(config.load_feedforward.apply(input.torque_in))
+    }
+
+    /// Direction of motion in the torque loop, -1 to 1: that of the observed speed, and while the input pulley stands, the
+    /// low-passed sign of the reference's rate.
+    pub fn direction(
+        &mut self,
+        config: &TorqueConfig,
+        drive: &DriveConfig,
+        rate_sign: i32,
+        speed: Speed,
+    ) -> Share {
+        /// Bits by which the observed speed, which is restless within 0.03 rad/s, tells less than a desired one.
+        const RESTLESS_BITS: u32 = 5;
+        match rate_sign {
+            1.. => self.direction_target = Share::ONE,
+            0 => {}
+            _ => self.direction_target = Share::ONE.negated(),
+        }
+        let expected = self.direction.approach(config.direction_filter, self.direction_target);
+        let seen = drive.correction.direction.of(Speed::from_bits(speed.to_bits() >> RESTLESS_BITS));
+        seen.plus(Share::ONE.minus(seen.magnitude()).of(expected))
     }
 
     /// Torque for the input pulley that the torque loop asks for.
@@ -177,13 +219,15 @@ impl Loops {
         input: &TorqueInput,
         limits: &mut Limits,
     ) -> Torque {
-        let TorqueInput { wanted, rate_sign, measured, friction, speed, .. } = *input;
+        let TorqueInput { wanted, rate_sign, measured, load, measured_load, friction, motion, direction } =
+            *input;
+        let speed = motion.speed;
         match rate_sign {
             1.. => self.falls = false,
             0 => {}
             _ => self.falls = true,
         }
-        let slow = self.slow.approach(config.lead_filter, input.torque_in);
+        let slow = self.slow.approach(config.lead_filter, measured_load);
         let friction = config.friction.apply(friction);
         let friction = if self.falls { friction.negated() } else { friction };
         let friction = self.friction.approach(config.friction_filter, friction);
@@ -197,8 +241,9 @@ impl Loops {
             .plus(config.proportional.apply(error))
             .plus(self.torque.value())
             .plus(drive.viscous.apply(speed))
+            .plus(drive.correction.torque(direction, speed, motion.angle, load))
             .minus(config.damping.apply(speed))
-            .minus(config.lead.apply(input.torque_in.minus(slow)))
+            .minus(config.lead.apply(measured_load.minus(slow)))
     }
 
     /// Duty that makes this torque, 1/32767, within all limits.
@@ -223,7 +268,7 @@ impl Loops {
         let voltage = config.resistance.apply(current).plus(config.back_emf.apply(speed));
         let bus_mv = (bus.to_bits() >> DROPPED).max(BUS_RANGE.0).min(BUS_RANGE.1);
         let voltage_mv = (voltage.to_bits() >> DROPPED).max(-bus_mv).min(bus_mv);
-        let full = voltage_mv * i32::from(i16::MAX) / bus_mv;
+        let full = config.dead_zone.duty_raw(voltage_mv * i32::from(i16::MAX) / bus_mv);
         let limit = i32::from(config.duty_limit_raw);
         let duty = full.max(-limit).min(limit);
         if duty != full {

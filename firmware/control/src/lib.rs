@@ -10,6 +10,7 @@
 //! | [`compensator`] | where the input pulley has to be for that |
 //! | [`sheath`] | how much friction the sheaths have at the moment |
 //! | [`observer`], [`drive`] | how the motor gets it there |
+//! | [`correction`] | what a diagnosis found beyond the nominal joint |
 //! | [`supervisor`] | states, and which fault counts in which |
 //! | [`parameters`] | everything that can be set, in SI units |
 //! | [`snapshot`] | the last ticks before a fault |
@@ -22,6 +23,7 @@
 pub mod compensator;
 pub mod conformance;
 pub mod controller;
+pub mod correction;
 pub mod drive;
 pub mod encoder;
 pub mod observer;

@@ -15,6 +15,7 @@
 //! | [`Voltage`] | V | ±2048 | 0.95e-6 |
 //! | [`Code`] | ADC code | ±524 288 | 1/4096 |
 //! | [`Ratio`] | 1 | ±128 | 60e-9 |
+//! | [`Share`] | 1 | ±1 | 0.93e-9 |
 //!
 //! Sums and differences saturate. A [`Gain`] rounds to nearest (half up) and saturates; its factor is exactly the `f32`
 //! it was made from, so the error of a product is at most half a step of the result.
@@ -22,7 +23,7 @@
 use core::cmp::Ordering;
 use core::marker::PhantomData;
 
-use fixed::types::{I8F24, I12F20, I20F12};
+use fixed::types::{I2F30, I8F24, I12F20, I20F12};
 
 /// A fixed-point quantity with a unit.
 pub trait Quantity: Copy + Default + PartialOrd {
@@ -193,6 +194,22 @@ impl Ratio {
     #[inline]
     pub const fn half_sum(self, other: Self) -> Self {
         Self(I8F24::from_bits((self.0.to_bits() >> 1) + (other.0.to_bits() >> 1)))
+    }
+}
+
+quantity!(Share, I2F30, 30, "Share from -1 to 1, in 2⁻³⁰.");
+
+impl Share {
+    /// 1.
+    pub const ONE: Self = Self(I2F30::ONE);
+
+    /// This share of a quantity, rounded to nearest.
+    #[must_use]
+    #[inline]
+    pub fn of<Q: Quantity>(self, quantity: Q) -> Q {
+        // Within ±1 the product is within the range of the quantity.
+        let product = i64::from(self.to_bits()) * i64::from(quantity.to_bits());
+        Q::from_bits(((product + (1 << (Self::FRACTION_BITS - 1))) >> Self::FRACTION_BITS) as i32)
     }
 }
 
@@ -390,6 +407,18 @@ mod tests {
         assert_eq!(large.apply(angle(1 << 20)).to_bits(), i32::MIN);
         assert_eq!(large.apply(angle(-(1 << 20))).to_bits(), i32::MAX);
         assert_eq!(large.apply(angle(-2)).to_bits(), 2_000_000);
+    }
+
+    #[test]
+    fn a_share_of_a_quantity_is_rounded() {
+        let third = Ratio::from_bits(357_913_941);
+        for (bits, expected) in [(3, 1), (300, 100), (-301, -100), (i32::MAX, 715_827_882)] {
+            assert_eq!(third.of(angle(bits)).to_bits(), expected, "{bits}");
+        }
+        for bits in [i32::MAX, -77, i32::MIN + 1] {
+            assert_eq!(Ratio::ONE.of(angle(bits)).to_bits(), bits);
+            assert_eq!(Ratio::ONE.negated().of(angle(bits)).to_bits(), -bits);
+        }
     }
 
     #[test]

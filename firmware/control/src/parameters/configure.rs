@@ -8,6 +8,11 @@ use micromath::F32Ext;
 
 use super::{Parameters, Reach};
 use crate::compensator::Compensator;
+use crate::correction::MotorCorrection;
+use crate::correction::dead_zone::DeadZone;
+use crate::correction::eccentricity::Eccentricity;
+use crate::correction::joint::JointCorrection;
+use crate::correction::lead::LeadConfig;
 use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::encoder::multi_turn::StepLimit;
 use crate::encoder::stuck::StuckConfig;
@@ -47,6 +52,9 @@ pub struct TickConfig {
     pub(crate) torque_bounds: ReferenceBounds,
     pub(crate) torque_window: TorqueWindow,
     pub(crate) supervisor: SupervisorConfig,
+    pub(crate) eccentricity: [Eccentricity; 2],
+    pub(crate) joint: JointCorrection,
+    pub(crate) lead: LeadConfig,
 }
 
 impl TickConfig {
@@ -74,6 +82,9 @@ impl TickConfig {
             torque_bounds,
             torque_window,
             supervisor,
+            eccentricity,
+            joint: joint_correction,
+            lead,
         } = other;
         self.rate_hz = *rate_hz;
         self.encoder[0] = *input;
@@ -95,6 +106,9 @@ impl TickConfig {
         self.torque_bounds = *torque_bounds;
         self.torque_window = *torque_window;
         self.supervisor = *supervisor;
+        self.eccentricity = *eccentricity;
+        self.joint = *joint_correction;
+        self.lead = *lead;
     }
 }
 
@@ -164,6 +178,9 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
                 .map(|outward| Torque::from_f32(reach.left_torque(outward))),
         },
         supervisor: supervisor(parameters, period_s),
+        eccentricity: Eccentricity::of_both(parameters),
+        joint: JointCorrection::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
+        lead: LeadConfig::new(parameters).ok_or_else(|| conflict("compensator.rate_limit"))?,
     })
 }
 
@@ -451,6 +468,7 @@ fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusa
         lead_filter: Weight::low_pass(LEAD_FILTER_S, period_s),
         friction: gain(controller.friction_feedforward, "controller.friction_feedforward")?,
         friction_filter: Weight::low_pass(FRICTION_FILTER_S, period_s),
+        direction_filter: Weight::low_pass(FRICTION_FILTER_S, period_s),
     })
 }
 
@@ -464,6 +482,9 @@ fn drive(parameters: &Parameters) -> Result<DriveConfig, Refusal> {
         current_limit: Current::from_f32(parameters.limits.current),
         duty_limit_raw: libm::rintf(parameters.bridge.duty_limit * f32::from(i16::MAX)) as i16,
         reversed: parameters.bridge.direction < 0.0,
+        correction: MotorCorrection::new(parameters)
+            .ok_or_else(|| conflict("correction.motor_friction.speed"))?,
+        dead_zone: DeadZone::new(parameters).ok_or_else(|| conflict("correction.dead_zone.width"))?,
     })
 }
 

@@ -9,8 +9,10 @@ use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
 use bowden_link::message::{Goal, Reference};
+use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
-use bowden_model::effect_set::EffectSet;
+use bowden_model::effect::{ActiveEffect, SensorPort};
+use bowden_model::effect_set::{EffectSet, FRESH_STATES};
 use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
     SheathParameters, TendonParameters,
@@ -76,6 +78,21 @@ pub fn as5045(count: u32) -> u32 {
 /// What can go wrong between the joint and the controller; changes the input of a tick.
 pub type Disturbance = fn(&mut TickInput);
 
+/// A joint and its physics beyond the nominal model.
+pub struct Physics(JointParameters, EffectSet);
+
+impl From<JointParameters> for Physics {
+    fn from(joint: JointParameters) -> Self {
+        Self(joint, EffectSet::EMPTY)
+    }
+}
+
+impl From<(JointParameters, &[ActiveEffect])> for Physics {
+    fn from((joint, effects): (JointParameters, &[ActiveEffect])) -> Self {
+        Self(joint, EffectSet::from_slice(effects).unwrap())
+    }
+}
+
 /// Joint, sensors, controller.
 pub struct Bench {
     pub parameters: Parameters,
@@ -92,9 +109,9 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(parameters: Parameters, joint: JointParameters) -> Self {
-        let config =
-            PlantConfig::new(joint, 12, EffectSet::EMPTY, InputBoundary::Motor, OutputBoundary::Arm).unwrap();
+    pub fn new(parameters: Parameters, physics: impl Into<Physics>) -> Self {
+        let Physics(joint, effects) = physics.into();
+        let config = PlantConfig::new(joint, 12, effects, InputBoundary::Motor, OutputBoundary::Arm).unwrap();
         let plant = Plant::at_rest(&config, 0.0, 0.0);
         let controller = Controller::new(tick_config(&parameters).unwrap());
         Self {
@@ -122,6 +139,13 @@ impl Bench {
         sum
     }
 
+    /// What an encoder shows; effects on encoders have no memory.
+    fn shown(&self, channel: Channel, value: f64) -> f64 {
+        let mut port = SensorPort { t_s: self.plant.t_s(), dt_s: 0.0, value };
+        self.config.effects().measure(channel, &mut FRESH_STATES.clone(), &mut port);
+        port.value
+    }
+
     fn code(&mut self, value: f64, zero: f64, per_code: f64, noise: f64) -> u16 {
         let noisy = value + noise * self.normal();
         (zero + noisy / per_code).round().clamp(0.0, 4095.0) as u16
@@ -137,7 +161,10 @@ impl Bench {
         let wired = f64::from(self.parameters.bridge.direction);
         let current_raw = self.code(wired * self.plant.current_a(), 2047.5, 0.006_715_5, 0.01);
         let encoder = self.words;
-        let angles = [turned[0] * self.plant.theta_in_rad(), turned[1] * self.plant.theta_out_rad()];
+        let angles = [
+            turned[0] * self.shown(Channel::ThetaIn, self.plant.theta_in_rad()),
+            turned[1] * self.shown(Channel::ThetaOut, self.plant.theta_out_rad()),
+        ];
         self.sequence = self.sequence.wrapping_add(1);
         for (word, (angle, zero)) in self.words.iter_mut().zip(angles.into_iter().zip([1000.0, 2000.0])) {
             let count = (angle / TAU * 4096.0 + zero).round() as i64;
@@ -177,8 +204,8 @@ impl Bench {
     }
 
     /// From power-on to ready.
-    pub fn ready(parameters: Parameters, joint: JointParameters) -> Self {
-        let mut bench = Self::new(parameters, joint);
+    pub fn ready(parameters: Parameters, physics: impl Into<Physics>) -> Self {
+        let mut bench = Self::new(parameters, physics);
         bench.run(0.01);
         bench.order(Goal::Ready);
         assert!(bench.reaches(State::Ready, 1.0), "{:?}", bench.controller.fault());

@@ -1,0 +1,312 @@
+//! Each correction on the joint of `bowden-model` with the effect that it is for.
+//!
+//! *Ideal* is the same bench without the effect, *before* with it, *after* with effect and correction. The correction has to
+//! take off at least 60 % of what the effect costs, `before - ideal`, where that is more than a tenth of the ideal, and never to
+//! make it worse. Strengths are at least those that the catalogue takes for typical.
+
+mod bench;
+
+use bench::{Bench, joint};
+use bowden_control::parameters::Parameters;
+use bowden_control::tick::Command;
+use bowden_control::tick_config;
+use bowden_link::State;
+use bowden_link::message::{Goal, Mode, Reference, Shape};
+use bowden_model::channel::Channel;
+use bowden_model::effect::{ActiveEffect, Target};
+use bowden_model::effects::find;
+
+fn effect(id: &str, parameters: &[(&str, f64)]) -> ActiveEffect {
+    parameters.iter().fold(ActiveEffect::with_defaults(find(id).unwrap()), |effect, (name, value)| {
+        effect.with(name, *value)
+    })
+}
+
+fn generated(shape: Shape, amplitude: f32, frequency_hz: f32) -> Reference {
+    Reference::Generated { shape, amplitude, offset: 0.0, frequency_hz }
+}
+
+/// References in position mode: smooth, with corners, fast.
+fn motions() -> [Reference; 3] {
+    [
+        generated(Shape::Sine, 0.5, 0.2),
+        generated(Shape::Triangle, 0.5, 0.25),
+        generated(Shape::Sine, 0.3, 1.0),
+    ]
+}
+
+/// So slow that the integral copes with most friction, and what is left is half a count of the encoder.
+fn crawl() -> Reference {
+    generated(Shape::Sine, 0.3, 0.05)
+}
+
+/// References in torque mode: with corners, slow.
+fn pulls() -> [Reference; 2] {
+    [generated(Shape::Triangle, 0.2, 0.25), generated(Shape::Sine, 0.2, 0.1)]
+}
+
+fn running(parameters: &Parameters, effects: &[ActiveEffect], mode: Mode, reference: Reference) -> Bench {
+    let mut bench = Bench::ready(parameters.clone(), (joint(), effects));
+    bench.refer(reference);
+    bench.order(Goal::Run(mode));
+    bench.run(2.0);
+    bench
+}
+
+/// RMS over the next `ticks` of an error that is made from bench and reference.
+fn rms(bench: &mut Bench, ticks: u32, error: impl Fn(&Bench, f64) -> f64) -> f64 {
+    let mut squares = 0.0;
+    for _ in 0..ticks {
+        let output = bench.tick();
+        squares += error(bench, f64::from(output.sample.reference_raw) / f64::from(1 << 20)).powi(2);
+    }
+    assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
+    (squares / f64::from(ticks)).sqrt()
+}
+
+/// Error of the true joint angle, rad.
+fn angle_error(bench: &Bench, reference: f64) -> f64 {
+    bench.plant.theta_out_rad() - reference
+}
+
+/// Error of the torque that moves the load, N·m; in slow motion it is the one that holds the weight.
+fn torque_error(bench: &Bench, reference: f64) -> f64 {
+    const WEIGHT_NM: f64 = 2.5 * 9.806_65 * 0.03;
+    WEIGHT_NM * bench.plant.theta_out_rad().sin() - reference
+}
+
+fn error(parameters: &Parameters, effects: &[ActiveEffect], mode: Mode, reference: Reference) -> f64 {
+    let mut bench = running(parameters, effects, mode, reference);
+    rms(&mut bench, 50_000, if mode == Mode::Position { angle_error } else { torque_error })
+}
+
+/// Errors of ideal, before and after.
+fn errors(effect: ActiveEffect, on: &impl Fn(&mut Parameters), mode: Mode, reference: Reference) -> [f64; 3] {
+    let off = Parameters::default();
+    let mut parameters = off.clone();
+    on(&mut parameters);
+    let runs = [(&off, [].as_slice()), (&off, &[effect]), (&parameters, &[effect])];
+    let errors = runs.map(|(parameters, effects)| error(parameters, effects, mode, reference));
+    println!("{effect:?}, {mode:?} {reference:?}: ideal, before, after {errors:?}");
+    errors
+}
+
+fn check(effect: ActiveEffect, on: impl Fn(&mut Parameters), mode: Mode, references: &[Reference]) {
+    for reference in references {
+        let [ideal, before, after] = errors(effect, &on, mode, *reference);
+        if before - ideal > 0.1 * ideal {
+            let gained = (before - after) / (before - ideal);
+            assert!(gained >= 0.6, "{effect:?}, {reference:?}: {gained:.2} of the ideal gain");
+        } else {
+            assert!(after <= 1.1 * before.max(ideal), "{effect:?}, {reference:?}: {after} after {before}");
+        }
+    }
+}
+
+/// Nothing is lost where there is little to gain.
+fn check_crawl(effect: ActiveEffect, on: impl Fn(&mut Parameters)) {
+    let [ideal, before, after] = errors(effect, &on, Mode::Position, crawl());
+    assert!(after <= before.max(1.3 * ideal), "{effect:?}: {after} after {before}, ideal {ideal}");
+}
+
+/// Switches the correction of the motor's friction on.
+fn motor_friction(coulomb: f32, excess: f32) -> impl Fn(&mut Parameters) {
+    move |parameters| {
+        let own = &mut parameters.correction.motor_friction;
+        (own.enable, own.coulomb, own.excess) = (1.0, coulomb, excess);
+    }
+}
+
+#[test]
+fn dry_friction_of_the_motor_is_made_up_for() {
+    for torque_nm in [0.08_f32, 0.2, 0.4] {
+        let friction = effect("motor_coulomb_friction", &[("torque_nm", torque_nm.into())]);
+        check(friction, motor_friction(torque_nm, 0.0), Mode::Position, &motions());
+        check_crawl(friction, motor_friction(torque_nm, 0.0));
+    }
+    for torque_nm in [0.08_f32, 0.2] {
+        let friction = effect("motor_coulomb_friction", &[("torque_nm", torque_nm.into())]);
+        check(friction, motor_friction(torque_nm, 0.0), Mode::Torque, &pulls());
+    }
+    let falling = effect("motor_stribeck_friction", &[]);
+    check(falling, motor_friction(0.04, 0.08), Mode::Position, &motions());
+    check_crawl(falling, motor_friction(0.04, 0.08));
+    check(falling, motor_friction(0.04, 0.08), Mode::Torque, &pulls());
+}
+
+#[test]
+fn friction_that_makes_the_loop_stick_and_slip_gets_no_worse() {
+    let falling = effect("motor_stribeck_friction", &[("excess_nm", 0.15), ("coulomb_nm", 0.1)]);
+    for reference in motions().into_iter().chain([crawl()]) {
+        let [_, before, after] = errors(falling, &motor_friction(0.1, 0.15), Mode::Position, reference);
+        assert!(after < before, "{reference:?}: {after} after {before}");
+    }
+}
+
+#[test]
+fn friction_that_grows_with_the_load_is_made_up_for() {
+    for coefficient in [0.1_f32, 0.3] {
+        let friction = effect("gear_load_friction", &[("coefficient", coefficient.into())]);
+        let on = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.gear_friction;
+            (own.enable, own.coefficient) = (1.0, coefficient);
+        };
+        check(friction, on, Mode::Position, &motions());
+        check_crawl(friction, on);
+        check(friction, on, Mode::Torque, &pulls());
+    }
+}
+
+#[test]
+fn cogging_is_cancelled() {
+    for (amplitude_nm, periods, phase) in [(0.1_f32, 40.0_f32, 0.0_f32), (0.2, 14.0, 1.0)] {
+        let ripple = effect(
+            "motor_cogging",
+            &[
+                ("amplitude_nm", amplitude_nm.into()),
+                ("cycles_per_turn", periods.into()),
+                ("phase_rad", phase.into()),
+            ],
+        );
+        // Either harmonic does it.
+        let first = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.cogging;
+            (own.enable, own.amplitude_1, own.periods_1, own.phase_1) = (1.0, amplitude_nm, periods, phase);
+        };
+        let second = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.cogging;
+            (own.enable, own.amplitude_2, own.periods_2, own.phase_2) = (1.0, amplitude_nm, periods, phase);
+        };
+        check(ripple, first, Mode::Position, &motions());
+        check(ripple, second, Mode::Position, &[crawl()]);
+        check(ripple, first, Mode::Torque, &pulls());
+    }
+}
+
+#[test]
+fn the_dead_zone_of_the_bridge_is_crossed() {
+    for duty in [0.01_f32, 0.03] {
+        let zone = effect("drive_dead_zone", &[("duty", duty.into())]);
+        let on = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.dead_zone;
+            (own.enable, own.duty) = (1.0, duty);
+        };
+        check(zone, on, Mode::Position, &motions());
+        check_crawl(zone, on);
+        check(zone, on, Mode::Torque, &pulls());
+    }
+}
+
+#[test]
+fn dry_friction_of_the_joint_is_made_up_for() {
+    for torque_nm in [0.05_f32, 0.2] {
+        let friction = effect("joint_coulomb_friction", &[("torque_nm", torque_nm.into())]);
+        let on = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.joint_friction;
+            (own.enable, own.coulomb) = (1.0, torque_nm);
+        };
+        check(friction, on, Mode::Position, &motions());
+        check_crawl(friction, on);
+    }
+    for torque_nm in [0.05_f32, 0.1] {
+        let friction = effect("joint_coulomb_friction", &[("torque_nm", torque_nm.into())]);
+        let on = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.joint_friction;
+            (own.enable, own.coulomb) = (1.0, torque_nm);
+        };
+        check(friction, on, Mode::Torque, &pulls());
+    }
+}
+
+#[test]
+fn a_spring_at_the_joint_is_carried() {
+    let spring = effect("joint_spring", &[("rest_rad", 0.2)]);
+    let on = |parameters: &mut Parameters| {
+        let own = &mut parameters.correction.joint_spring;
+        (own.enable, own.stiffness, own.rest) = (1.0, 0.3, 0.2);
+    };
+    check(spring, on, Mode::Position, &motions());
+    check_crawl(spring, on);
+    check(spring, on, Mode::Torque, &pulls());
+}
+
+#[test]
+fn an_eccentric_encoder_is_read_right() {
+    for amplitude_rad in [0.01_f32, 0.03] {
+        let mut disc =
+            effect("encoder_eccentricity", &[("amplitude_rad", amplitude_rad.into()), ("phase_rad", 1.0)]);
+        disc.target = Target::One(Channel::ThetaIn);
+        let on = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.input_encoder;
+            (own.enable, own.amplitude, own.phase) = (1.0, amplitude_rad, 1.0);
+        };
+        check(disc, on, Mode::Position, &motions());
+        check_crawl(disc, on);
+    }
+    // That of the joint serves the compensator that learns the lag from both encoders.
+    let mut disc = effect("encoder_eccentricity", &[("amplitude_rad", 0.02), ("phase_rad", 1.0)]);
+    disc.target = Target::One(Channel::ThetaOut);
+    let mut off = Parameters::default();
+    off.compensator.source = 2.0;
+    let mut on = off.clone();
+    let own = &mut on.correction.joint_encoder;
+    (own.enable, own.amplitude, own.phase) = (1.0, 0.02, 1.0);
+    let [reference, ..] = motions();
+    let runs = [(&off, [].as_slice()), (&off, &[disc]), (&on, &[disc])];
+    let [ideal, before, after] =
+        runs.map(|(parameters, effects)| error(parameters, effects, Mode::Position, reference));
+    assert!(before > 1.1 * ideal && before - after > 0.6 * (before - ideal), "{ideal} {before} {after}");
+}
+
+#[test]
+fn corrections_that_are_too_strong_cost_no_stability() {
+    // A third too much of everything, on a joint that has all of it: better than nothing still.
+    let effects = [
+        effect("motor_coulomb_friction", &[("torque_nm", 0.1)]),
+        effect("drive_dead_zone", &[("duty", 0.015)]),
+        effect("joint_coulomb_friction", &[("torque_nm", 0.06)]),
+        effect("motor_cogging", &[("amplitude_nm", 0.06)]),
+    ];
+    let mut parameters = Parameters::default();
+    let own = &mut parameters.correction;
+    (own.motor_friction.enable, own.motor_friction.coulomb) = (1.0, 0.133);
+    (own.dead_zone.enable, own.dead_zone.duty) = (1.0, 0.02);
+    (own.joint_friction.enable, own.joint_friction.coulomb) = (1.0, 0.08);
+    (own.cogging.enable, own.cogging.amplitude_1) = (1.0, 0.08);
+    for (mode, references) in [(Mode::Position, motions().as_slice()), (Mode::Torque, &pulls())] {
+        for reference in references {
+            let before = error(&Parameters::default(), &effects, mode, *reference);
+            let after = error(&parameters, &effects, mode, *reference);
+            println!("{mode:?} {reference:?}: before {before:.3e}, after {after:.3e}");
+            assert!(after < before, "{reference:?}: {after} after {before}");
+        }
+    }
+}
+
+#[test]
+fn corrections_may_be_switched_while_the_joint_moves() {
+    let effects = [
+        effect("motor_coulomb_friction", &[("torque_nm", 0.2)]),
+        effect("drive_dead_zone", &[("duty", 0.03)]),
+        effect("joint_coulomb_friction", &[("torque_nm", 0.1)]),
+    ];
+    let off = Parameters::default();
+    let mut on = off.clone();
+    let own = &mut on.correction;
+    (own.motor_friction.enable, own.motor_friction.coulomb) = (1.0, 0.2);
+    (own.dead_zone.enable, own.dead_zone.duty) = (1.0, 0.03);
+    (own.joint_friction.enable, own.joint_friction.coulomb) = (1.0, 0.1);
+    let [reference, ..] = motions();
+    let mut bench = running(&off, &effects, Mode::Position, reference);
+    let mut seconds = Vec::new();
+    for second in 0..6 {
+        let parameters = if second % 2 == 0 { &on } else { &off };
+        bench.queues.commands.push_back(Command::Configure(tick_config(parameters).unwrap()));
+        bench.run(0.5);
+        seconds.push(rms(&mut bench, 20_000, angle_error));
+    }
+    println!("on, off, ...: {seconds:?}");
+    for pair in seconds.chunks(2) {
+        assert!(pair[0] < 0.4 * pair[1], "{seconds:?}");
+    }
+}
