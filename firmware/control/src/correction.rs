@@ -7,6 +7,8 @@
 //! | [`cogging`] | `-Σ A sin(n θ + φ)` | torque of the motor |
 //! | [`dead_zone`] | `d + d_0 s(d)` | duty |
 //! | [`joint`] | `s τ_c + k (θ - θ_0)` | torque asked of the joint, stretch of the tendons |
+//! | [`sheath`] | friction beyond `mu K` | for the compensator |
+//! | [`backlash`] | half a gap towards the torque | for the compensator |
 //! | [`eccentricity`] | `-A (sin(y + φ) - sin φ)` | angle of an encoder |
 //!
 //! All are off by default and change no bit then. `s`, the smooth sign, and `f`, the fade with speed, are in [`shape`].
@@ -14,6 +16,7 @@
 //! The direction of motion is that of the reference in position mode, which knows a reversal ahead of the encoder and cannot
 //! feed back. In torque mode it is that of the input pulley, and while this stands, that of the torque's rate.
 
+pub mod backlash;
 pub mod cogging;
 pub mod dead_zone;
 pub mod eccentricity;
@@ -22,6 +25,7 @@ pub mod joint;
 pub mod lead;
 pub mod motor_friction;
 pub mod shape;
+pub mod sheath;
 
 use crate::parameters::Parameters;
 use crate::scale::{Angle, Share, Speed, Torque};
