@@ -4,10 +4,11 @@
 //! |---|---|
 //! | `[motor]`, `[pulleys]`, `[tendon]`, `[sheath]`, `[load]` | the parameter of the same meaning, see [`nominal`] |
 //! | gain and zero of a sensor | gain and zero of the board's channel, see [`sensors`] |
-//! | any other effect | its correction on the board, or a reason why there is none, see [`effects`] |
+//! | any other effect | its correction on the board, see [`corrections`], or a reason why there is none, see [`effects`] |
 //!
 //! A [`Transfer`] only says what is to be set; [`ParameterSet::replace`] sets it.
 
+mod corrections;
 mod draft;
 mod effects;
 mod nominal;
@@ -37,10 +38,10 @@ pub struct Change {
     pub sources: String,
 }
 
-/// A part of the rig that the board cannot use.
+/// Something that does not act in full: a part of the rig that the board cannot use, or a limit of the board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unused {
-    /// Key of the rig file.
+    /// Key of the rig file, or parameter of the board.
     pub source: String,
     /// Why not.
     pub reason: String,
@@ -53,6 +54,8 @@ pub struct Transfer {
     pub changes: Vec<Change>,
     /// Parts of the rig that change nothing.
     pub unused: Vec<Unused>,
+    /// Limits of the board that cut a part of the rig.
+    pub limited: Vec<Unused>,
 }
 
 impl Transfer {
@@ -76,7 +79,7 @@ impl Transfer {
             rig.effects.iter().rev().filter_map(|active| effects::carry(active, &mut draft)).collect();
         of_effects.reverse();
         unused.append(&mut of_effects);
-        Ok(Self { changes: draft.changes(source)?, unused })
+        Ok(Self { changes: draft.changes(source)?, unused, limited: corrections::limited(&draft) })
     }
 
     /// The new values by index, for [`ParameterSet::replace`].
@@ -104,6 +107,9 @@ impl Transfer {
         }
         for Unused { source, reason } in &self.unused {
             let _ = writeln!(text, "not used: {source}: {reason}");
+        }
+        for Unused { source, reason } in &self.limited {
+            let _ = writeln!(text, "limited: {source}: {reason}");
         }
         text
     }

@@ -335,7 +335,7 @@ impl ParameterSet {
 }
 
 /// The decimal number that stands for an `f32` in a file, as the nearest `f64`.
-fn shortest(value: f32) -> f64 {
+pub(super) fn shortest(value: f32) -> f64 {
     // The shortest form of a number always reads back.
     format!("{value:?}").parse().unwrap_or(f64::from(value))
 }

@@ -157,6 +157,60 @@ fn what_the_board_cannot_use_is_said_with_the_reason() {
 }
 
 #[test]
+fn effects_become_corrections_of_the_board() {
+    let text = rig(
+        "\"motor_coulomb_friction\", \"motor_stribeck_friction\", \"motor_cogging\", \"sheath_stribeck_friction\", \
+         \"bending_friction\", \"encoder_eccentricity\", \"gear_load_friction\"",
+        "[effects.motor_coulomb_friction]\ntorque_nm = 0.25\n\
+         [effects.motor_stribeck_friction]\nexcess_nm = 0.4\nspeed_rad_s = 0.5\ncoulomb_nm = 0.125\n\
+         [effects.motor_cogging]\namplitude_nm = 0.0625\ncycles_per_turn = 14.0\nphase_rad = -1.5\n\
+         [effects.sheath_stribeck_friction]\nstatic_ratio = 1.5\nspeed_m_s = 0.25\nexponent = 2.0\n\
+         [effects.bending_friction]\nfriction_n_per_rad = 0.75\n\
+         [effects.gear_load_friction]\ncoefficient = 0.1\nexponent = 2.0\n\
+         [[effects.encoder_eccentricity]]\nchannel = \"theta_in_rad\"\namplitude_rad = 0.0625\nphase_rad = 2.0\n\
+         [[effects.encoder_eccentricity]]\nchannel = \"theta_motor_rad\"\namplitude_rad = 0.01\n",
+    );
+    let folder = folder_with("rig.toml", &text);
+    let arguments = ["params", "from-rig", "rig.toml", "--port", "sim", "--dry-run"];
+    let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let words: Vec<Vec<&str>> =
+        stdout.lines().map(|line| line.split_whitespace().take(3).collect()).collect();
+    // The friction at speed of both effects is added: 0.25 + 0.125.
+    for (name, old, new) in [
+        ("correction.motor_friction.enable", "0.0", "1.0"),
+        ("correction.motor_friction.coulomb", "0.0", "0.375"),
+        ("correction.motor_friction.excess", "0.0", "0.4"),
+        ("correction.motor_friction.speed", "0.2", "0.5"),
+        ("correction.cogging.enable", "0.0", "1.0"),
+        ("correction.cogging.amplitude_1", "0.0", "0.0625"),
+        ("correction.cogging.periods_1", "40.0", "14.0"),
+        ("correction.cogging.phase_1", "0.0", "-1.5"),
+        ("correction.sheath.enable", "0.0", "1.0"),
+        ("correction.sheath.excess", "0.0", "0.5"),
+        ("correction.sheath.speed", "0.003", "0.25"),
+        ("correction.sheath.exponent", "1.5", "2.0"),
+        ("correction.sheath.bending", "0.0", "0.75"),
+        ("correction.input_encoder.enable", "0.0", "1.0"),
+        ("correction.input_encoder.amplitude", "0.0", "0.0625"),
+        ("correction.input_encoder.phase", "0.0", "2.0"),
+    ] {
+        assert!(words.contains(&vec![name, old, new]), "{name}: {stdout}");
+    }
+    assert!(stdout.ends_with(
+        "not used: effects.encoder_eccentricity of theta_motor_rad: the board has no encoder on the rotor\n\
+         not used: effects.gear_load_friction: the board knows friction in proportion to the torque only, the exponent is 2\n\
+         limited: correction.motor_friction.limit: 0.5 of 0.6750 act; raise it if the joint may have more\n\
+         limited: correction.input_encoder.limit: 0.05 of 0.0625 act; raise it if the joint may have more\n\
+         17 parameters would be set\n"
+    ), "{stdout}");
+    // The fake has no corrections.
+    let (transfer, _) = transfer(&rig("\"joint_spring\"", ""), &[]);
+    let reason = "this firmware has no parameter `correction.joint_spring.enable`".to_owned();
+    assert_eq!(transfer.unused.last(), Some(&Unused { source: "effects.joint_spring".to_owned(), reason }));
+}
+
+#[test]
 fn a_refusal_leaves_the_board_as_it_was() {
     let text = rig("", "").replace("gear_ratio = 30.0", "gear_ratio = 29.0");
     let text = text.replace("pretension_n = 30.0", "pretension_n = 28.0");

@@ -8,6 +8,7 @@ use bowden_link::message::Parameter;
 
 use super::Change;
 use crate::link::ParameterSet;
+use crate::link::parameters::shortest;
 use crate::outcome::Failure;
 
 /// Values for a board's parameters, each with the keys of the rig that it comes from.
@@ -38,7 +39,7 @@ impl<'p> Draft<'p> {
             return Ok(*value);
         }
         let recorded = self.recorded.iter().find(|(index, _)| *index == parameter.index);
-        Ok(f64::from(recorded.map_or(parameter.value, |(_, value)| *value)))
+        Ok(shortest(recorded.map_or(parameter.value, |(_, value)| *value)))
     }
 
     /// Whether the rig already gave this parameter a value.

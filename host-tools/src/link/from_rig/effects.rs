@@ -4,7 +4,7 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::CATALOGUE;
 
 use super::draft::Draft;
-use super::{Unused, sensors};
+use super::{Unused, corrections, sensors};
 
 /// Drafts what an effect changes on the board; `source` is the effect's key in the rig. Returns a reason if it cannot.
 type Carry = fn(active: &ActiveEffect, draft: &mut Draft, source: &str) -> Result<(), String>;
@@ -19,43 +19,42 @@ enum OnBoard {
 use OnBoard::{Carried, Unused as NotUsed};
 
 const CHANGES_WITH_TIME: &str = "it changes with time, the board's parameters do not";
-const NO_CORRECTION: &str = "this firmware has no correction for it";
 
 /// One entry for each effect, in the order of [`CATALOGUE`].
 static EFFECTS_ON_BOARD: [(&str, OnBoard); CATALOGUE.len()] = [
-    ("motor_coulomb_friction", NotUsed(NO_CORRECTION)),
+    ("motor_coulomb_friction", Carried(corrections::motor_coulomb)),
     ("motor_viscous_friction", Carried(motor_viscous)),
-    ("motor_stribeck_friction", NotUsed(NO_CORRECTION)),
-    ("gear_load_friction", NotUsed(NO_CORRECTION)),
+    ("motor_stribeck_friction", Carried(corrections::motor_stribeck)),
+    ("gear_load_friction", Carried(corrections::gear_load)),
     ("gear_backlash", NotUsed("both encoders are behind the gear: the position loop sees the play itself")),
-    ("motor_cogging", NotUsed(NO_CORRECTION)),
-    ("drive_dead_zone", NotUsed(NO_CORRECTION)),
+    ("motor_cogging", Carried(corrections::cogging)),
+    ("drive_dead_zone", Carried(corrections::dead_zone)),
     ("winding_heating", NotUsed("the board has no model of the winding's temperature")),
     ("distributed_friction", NotUsed("the compensator takes friction as distributed anyway")),
-    ("sheath_viscous_friction", NotUsed(NO_CORRECTION)),
-    ("sheath_stribeck_friction", NotUsed(NO_CORRECTION)),
+    ("sheath_viscous_friction", Carried(corrections::sheath_viscous)),
+    ("sheath_stribeck_friction", Carried(corrections::sheath_stribeck)),
     ("presliding_compliance", NotUsed("the compensator takes contacts as rigid until they slip")),
-    ("bending_friction", NotUsed(NO_CORRECTION)),
-    ("asymmetric_friction", NotUsed(NO_CORRECTION)),
+    ("bending_friction", Carried(corrections::bending)),
+    ("asymmetric_friction", Carried(corrections::asymmetry)),
     ("friction_drift", NotUsed(CHANGES_WITH_TIME)),
-    ("wrap_angle_varies_with_pose", NotUsed(NO_CORRECTION)),
+    ("wrap_angle_varies_with_pose", Carried(corrections::pose)),
     ("wrap_angle_disturbed", NotUsed(CHANGES_WITH_TIME)),
     ("tendon_slack", NotUsed("the board stops at a slack tendon; raise the pretension")),
     ("tendon_stiffening", NotUsed("the compensator takes the stiffness as constant")),
     ("tendon_creep", NotUsed(CHANGES_WITH_TIME)),
     ("pretension_loss", NotUsed("a loss is for the bench: restore the pretension")),
-    ("transmission_backlash", NotUsed(NO_CORRECTION)),
-    ("joint_coulomb_friction", NotUsed(NO_CORRECTION)),
+    ("transmission_backlash", Carried(corrections::transmission_backlash)),
+    ("joint_coulomb_friction", Carried(corrections::joint_coulomb)),
     ("joint_viscous_friction", NotUsed("the board does not feed viscous friction of the joint forward")),
-    ("joint_backlash", NotUsed(NO_CORRECTION)),
-    ("joint_spring", NotUsed(NO_CORRECTION)),
+    ("joint_backlash", Carried(corrections::joint_backlash)),
+    ("joint_spring", Carried(corrections::joint_spring)),
     ("joint_torque_ripple", NotUsed("the board does not feed torque ripple of the joint forward")),
     (
         "end_stop_contact",
         NotUsed("keep the joint off the stop with limits.angle_minimum and limits.angle_maximum"),
     ),
     ("payload_change", NotUsed(CHANGES_WITH_TIME)),
-    ("encoder_eccentricity", NotUsed(NO_CORRECTION)),
+    ("encoder_eccentricity", Carried(corrections::eccentricity)),
     ("sensor_gain_error", Carried(sensors::gain)),
     ("sensor_offset", Carried(sensors::offset)),
     ("sensor_lag", NotUsed("the board does not undo the lag of a sensor")),
@@ -73,7 +72,7 @@ pub(super) fn carry(active: &ActiveEffect, draft: &mut Draft) -> Option<Unused> 
     let reason = match on_board {
         Some(Carried(carry)) => carry(active, draft, &source).err()?,
         Some(NotUsed(reason)) => (*reason).to_owned(),
-        None => NO_CORRECTION.to_owned(),
+        None => "this program does not know it".to_owned(),
     };
     Some(Unused { source, reason })
 }
