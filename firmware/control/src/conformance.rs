@@ -4,6 +4,8 @@
 //! adversarial inputs and hashes every output bit. The inputs come from the seed alone. A board, an emulated core and a
 //! workstation that print the same number for the same seed have computed the same.
 
+mod corrections;
+
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{Fault, State};
 
@@ -13,6 +15,8 @@ use crate::parameters::Parameters;
 use crate::scale::{Angle, Quantity, Speed, Torque};
 use crate::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
 use crate::{reference_config, tick_config};
+
+pub use corrections::correction_digest;
 
 /// What a run came by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,11 +38,17 @@ pub fn digest(seed: u32, ticks: u32) -> u32 {
 /// Runs `ticks` ticks of compensator and controller for each of the three sources of the lag angle.
 #[must_use]
 pub fn run(seed: u32, ticks: u32) -> Outcome {
+    run_with(seed, ticks, |_| {})
+}
+
+/// The same with other parameters than the usual ones.
+fn run_with(seed: u32, ticks: u32, prepare: fn(&mut Parameters)) -> Outcome {
     let mut hash = Hash::default();
     let mut outcome = Outcome::default();
     for source in 0..3_u8 {
         let mut random = Random(seed ^ u32::from(source) << 24);
-        let parameters = parameters(source, &mut random);
+        let mut parameters = parameters(source, &mut random);
+        prepare(&mut parameters);
         let (Some(compensator), Ok(config)) = (Compensator::new(&parameters), tick_config(&parameters))
         else {
             continue;
