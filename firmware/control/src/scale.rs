@@ -411,13 +411,13 @@ mod tests {
 
     #[test]
     fn a_share_of_a_quantity_is_rounded() {
-        let third = Ratio::from_bits(357_913_941);
+        let third = Share::from_bits(357_913_941);
         for (bits, expected) in [(3, 1), (300, 100), (-301, -100), (i32::MAX, 715_827_882)] {
             assert_eq!(third.of(angle(bits)).to_bits(), expected, "{bits}");
         }
         for bits in [i32::MAX, -77, i32::MIN + 1] {
-            assert_eq!(Ratio::ONE.of(angle(bits)).to_bits(), bits);
-            assert_eq!(Ratio::ONE.negated().of(angle(bits)).to_bits(), -bits);
+            assert_eq!(Share::ONE.of(angle(bits)).to_bits(), bits);
+            assert_eq!(Share::ONE.negated().of(angle(bits)).to_bits(), -bits);
         }
     }
 

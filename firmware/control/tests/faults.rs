@@ -216,14 +216,14 @@ fn tensions_that_do_not_fit_the_friction_are_found() {
 
 #[test]
 fn tensions_that_contradict_the_stretch_are_found() {
-    // f1 reads 24 N too much: both ends of cable a are 84 N, at rest 60 N, and 20 N apart are allowed.
+    // f1 reads 36 N too much: both ends of cable a are 96 N, at rest 60 N, and 30 N apart are allowed.
     let mut bench = Bench::ready(Parameters::default(), joint());
-    bench.disturbance = Some(|input| input.tension_raw[0] += 685);
+    bench.disturbance = Some(|input| input.tension_raw[0] += 1027);
     let (ticks, record) = trip(&mut bench, 5000);
     assert_eq!((record.fault, record.channel), (Fault::StretchInconsistent, 0));
-    // 6 times 50 ms, and what the low-pass of 5 ms needs to 20 of 24 N: 5 ms ln(24/4) = 9 ms.
+    // 6 times 50 ms, and what the low-pass of 5 ms needs to 30 of 36 N: 5 ms ln(36/6) = 9 ms.
     assert!((3050..=3150).contains(&ticks), "{ticks} ticks");
-    assert!((23.0..25.0).contains(&record.got) && record.limit == 20.0, "{record}");
+    assert!((35.0..37.0).contains(&record.got) && record.limit == 30.0, "{record}");
 }
 
 /// Channels that belong to other places than the parameters say: found while the joint turns, before it has turned far.

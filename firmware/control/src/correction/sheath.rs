@@ -21,7 +21,7 @@
 
 use super::shape::{Fade, SmoothSign};
 use crate::parameters::Parameters;
-use crate::scale::{Angle, Gain, Quantity, Ratio, Speed, Torque};
+use crate::scale::{Angle, Gain, Quantity, Share, Speed, Torque};
 
 /// Sheath friction beyond the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct SheathCorrection {
     sign: SmoothSign<Speed>,
     fade: Fade,
     /// `e`.
-    excess: Ratio,
+    excess: Share,
     /// `2 r2 F0 mu K`.
     nominal: Torque,
     /// `2 r2 F0 mu k`.
@@ -61,7 +61,7 @@ impl SheathCorrection {
             sign: SmoothSign::new(parameters.correction.reversal_speed)?,
             fade: Fade::new(own.speed / pulley.input_radius, own.exponent)?,
             // Up to four times the friction at speed: more than a ratio in fixed point holds.
-            excess: Ratio::from_f32(own.excess / EXCESS_UNIT),
+            excess: Share::from_f32(own.excess / EXCESS_UNIT),
             nominal: Torque::from_f32(lever_m * rubbing_n * sheath.wrap_angle * EXCESS_UNIT),
             nominal_by_pose: Gain::new(lever_m * rubbing_n * own.pose_slope * EXCESS_UNIT)?,
             bending: Torque::from_f32(lever_m * own.bending * sheath.wrap_angle),
@@ -82,7 +82,7 @@ impl SheathCorrection {
             return Torque::ZERO;
         }
         let mut level = self.bending;
-        if self.excess != Ratio::ZERO {
+        if self.excess != Share::ZERO {
             let nominal = self.nominal.plus(self.nominal_by_pose.apply(theta_out));
             level = level.plus(self.fade.of(speed).of(self.excess.of(nominal)));
         }
@@ -108,7 +108,7 @@ impl SheathCorrection {
         if self.limit == Torque::ZERO {
             return Angle::ZERO;
         }
-        let torque = torque_out.plus(Ratio::from_bits(SIXTH).of(torque_in.minus(torque_out)));
+        let torque = torque_out.plus(Share::from_bits(SIXTH).of(torque_in.minus(torque_out)));
         self.stretch.apply(self.friction_torque(speed, theta_out, torque))
     }
 }

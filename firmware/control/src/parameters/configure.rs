@@ -450,7 +450,7 @@ fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusa
     const FRICTION_FILTER_S: f32 = 0.02;
     /// Part of the gain, and multiple of the damping, where the output torque is estimated: there the loop only helps the
     /// input torque on its way, and what it overshoots is mistaken for friction.
-    const ESTIMATED_GAIN: f32 = 0.22;
+    const ESTIMATED_GAIN: f32 = 0.66;
     const ESTIMATED_DAMPING: f32 = 3.0;
     let controller = &parameters.controller;
     let (gain_part, damping_part) = match fitted(parameters) {

@@ -58,7 +58,7 @@ parameter_table! {
     controller.observer_bandwidth, "Hz", 1.0, 500.0, 20.0, true;
     controller.acceleration_feedforward, "", 0.0, 1.2, 1.0, true;
     controller.load_feedforward, "", 0.0, 1.2, 1.0, true;
-    controller.torque_gain, "", 0.0, 40.0, 12.0, true;
+    controller.torque_gain, "", 0.0, 40.0, 4.0, true;
     controller.torque_integral_time, "s", 0.005, 100.0, 0.1, true;
     controller.torque_damping, "N·m·s/rad", 0.0, 10.0, 0.2, true;
     controller.friction_feedforward, "", 0.0, 1.2, 1.0, true;
@@ -94,7 +94,7 @@ parameter_table! {
     supervisor.host_timeout, "s", 0.01, 60.0, 0.5, true;
     supervisor.allow_provoke, "", 0.0, 1.0, 0.0, true;
     tension.fitted, "", 0.0, 2.0, 2.0, false;
-    tension.stretch_margin, "N", 0.1, 1000.0, 10.0, true;
+    tension.stretch_margin, "N", 0.1, 1000.0, 15.0, true;
     sheath.adapts, "", 0.0, 1.0, 1.0, true;
     sheath.exponent_rate, "1/s", 0.0, 10.0, 0.1, true;
     sheath.exponent_maximum, "", 0.0, 3.0, 1.2, true;
