@@ -7,7 +7,7 @@ use bowden_link::message::Mode;
 use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
 
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
-use crate::correction::lead::Lead;
+use crate::correction::lead::{Lead, Led};
 use crate::drive::{Loops, PositionInput, TorqueInput};
 use crate::encoder::EncoderChannel;
 use crate::encoder::stuck::StuckWatch;
@@ -289,7 +289,12 @@ impl Controller {
             if compensated.limited {
                 limits.insert(Limit::Compensation);
             }
-            let (lead, lead_speed) = self.lead.follow(&config.lead, config.joint.stretch(own));
+            let leads = config.leads.lead(&Led {
+                speed: compensation.omega_d,
+                theta: compensation.theta_d,
+                friction: readings.sheath.friction_torque,
+            });
+            let (lead, lead_speed) = self.lead.follow(&config.lead, config.joint.stretch(own).plus(leads));
             let command = compensated.theta_c.plus(lead);
             let position = PositionInput {
                 command,
@@ -312,11 +317,18 @@ impl Controller {
         reference: &ReferenceOutput,
         limits: &mut Limits,
     ) -> Torque {
+        let theta = readings.theta[1];
         let rate_sign = reference.change.signum() as i32;
         let direction = loops.direction(&config.torque, &config.drive, rate_sign, readings.motion.speed);
-        let wanted = Torque::from_bits(reference.value_bits);
+        let mut wanted = Torque::from_bits(reference.value_bits).plus(config.joint.torque(direction, theta));
+        // What a correction adds does not push a free joint out of its range either.
+        let [low, high] = config.angle_bounds.range.map(Angle::from_bits);
+        if (theta > high && wanted > Torque::ZERO) || (theta < low && wanted < Torque::ZERO) {
+            wanted = Torque::ZERO;
+            limits.insert(Limit::ReferenceRange);
+        }
         let input = TorqueInput {
-            wanted: wanted.plus(config.joint.torque(direction, readings.theta[1])),
+            wanted,
             rate_sign,
             measured: readings.sheath.torque_out,
             load: readings.load,

@@ -74,6 +74,8 @@ pub struct SheathConfig {
     pub stretch: Gain<Angle, Torque>,
     /// Half of the width of the dead zone per `q`, with a margin: `1.2 F0 L/(EA r1)`.
     pub zone: Gain<Ratio, Angle>,
+    /// Half of the play of transmission and joint that is known, which the dead zone is wider by.
+    pub play: Angle,
     /// `F0 L/(EA r1)`: half of the dead zone at the input pulley, per `q`.
     pub half_zone: Gain<Ratio, Angle>,
     /// `r2/r1`: angle of the joint at the input pulley.
@@ -237,7 +239,7 @@ impl SheathObserver {
         }
         let torque_in = self.torque_in.approach(config.torque_filter, measured_in);
         let [a, b] = self.cables.map(|cable| cable.ratio.value());
-        let half_width = config.zone.apply(a.half_sum(b));
+        let half_width = config.zone.apply(a.half_sum(b)).plus(config.play);
         let slip = self.zone.step(input.motion.angle, half_width);
         if config.adapts {
             match config.fitted {

@@ -319,111 +319,30 @@ fn corrections_may_be_switched_while_the_joint_moves() {
     }
 }
 
-/// What a lead of the input pulley is computed from: desired motion, and the torques that it takes.
-#[derive(Clone, Copy)]
-struct Wanted {
-    theta: Angle,
-    omega: Speed,
-    torque_in: Torque,
-    torque_out: Torque,
-}
-
-/// RMS error of the joint along a sine of 0.5 rad, with a lead added to the reference ahead of the controller: point by point,
-/// with the weight and the sheath friction of the bench.
-fn led_error(
-    parameters: &Parameters,
-    effects: &[ActiveEffect],
-    frequency_hz: f64,
-    lead: impl Fn(Wanted) -> Angle,
-) -> f64 {
-    let mut parameters = parameters.clone();
-    parameters.reference.stream_rate = 10_000.0;
-    // The comparison of both ends of a cable knows the nominal friction only.
-    parameters.tension.margin = 10.0;
-    let (mut state, config) = (Lead::default(), LeadConfig::new(&parameters).unwrap());
-    let mut bench = Bench::ready(parameters, (joint(), effects));
-    bench.refer(Reference::Stream);
-    bench.order(Goal::Run(Mode::Position));
-    let (mut squares, mut counted) = (0.0, 0);
-    for tick in 0..100_000 {
-        let t_s = f64::from(tick) * 1e-4;
-        let turned = std::f64::consts::TAU * frequency_hz * t_s;
-        let (theta, omega) = (0.5 * turned.sin(), 0.5 * std::f64::consts::TAU * frequency_hz * turned.cos());
-        let torque_out_nm = 0.7355 * theta.sin();
-        let wanted = Wanted {
-            theta: Angle::from_f32(theta as f32),
-            omega: Speed::from_f32(omega as f32),
-            torque_in: Torque::from_f32((torque_out_nm + 0.339 * omega.signum()) as f32),
-            torque_out: Torque::from_f32(torque_out_nm as f32),
-        };
-        let (angle, _) = state.follow(&config, lead(wanted));
-        bench.queues.points.push_back(wanted.theta.plus(angle).to_bits());
-        bench.tick();
-        if t_s > 2.0 {
-            squares += (bench.plant.theta_out_rad() - theta).powi(2);
-            counted += 1;
-        }
-    }
-    assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
-    (squares / f64::from(counted)).sqrt()
-}
-
-/// The same rule for corrections that the compensator is to use: 60 % of the ideal gain.
-fn check_led(effect: ActiveEffect, frequencies_hz: &[f64], lead: impl Fn(Wanted) -> Angle) {
-    let off = Parameters::default();
-    for &frequency_hz in frequencies_hz {
-        let ideal = led_error(&off, &[], frequency_hz, |_| Angle::ZERO);
-        let before = led_error(&off, &[effect], frequency_hz, |_| Angle::ZERO);
-        let after = led_error(&off, &[effect], frequency_hz, &lead);
-        println!("{effect:?} {frequency_hz} Hz: ideal, before, after {ideal:.3e}, {before:.3e}, {after:.3e}");
-        judge([ideal, before, after], &format!("{effect:?}, {frequency_hz} Hz"));
-    }
-}
-
 #[test]
 fn play_is_crossed() {
-    for (id, gap_rad, gaps) in
-        [("transmission_backlash", 0.02, [0.02_f32, 0.0]), ("joint_backlash", 0.02, [0.0, 0.02])]
-    {
-        let mut parameters = Parameters::default();
-        let own = &mut parameters.correction.backlash;
-        (own.enable, own.transmission_gap, own.joint_gap) = (1.0, gaps[0], gaps[1]);
-        let backlash = Backlash::new(&parameters).unwrap();
-        check_led(effect(id, &[("gap_rad", gap_rad)]), &[0.1, 0.2, 0.5], |wanted| {
-            backlash.lead(wanted.torque_in, wanted.torque_out)
-        });
+    for (id, gaps) in [("transmission_backlash", [0.02_f32, 0.0]), ("joint_backlash", [0.0, 0.02])] {
+        let on = |parameters: &mut Parameters| {
+            let own = &mut parameters.correction.backlash;
+            (own.enable, own.transmission_gap, own.joint_gap) = (1.0, gaps[0], gaps[1]);
+            parameters.sheath.adapts = 0.0;
+        };
+        check(effect(id, &[("gap_rad", 0.02)]), on, Mode::Position, &motions()[..1]);
     }
 }
 
+/// With friction that is not followed while the joint moves, which would take it in.
 #[test]
 fn sheath_friction_beyond_the_nominal_one_is_led() {
-    let sheath = |set: fn(&mut Parameters)| {
-        let mut parameters = Parameters::default();
-        parameters.correction.sheath.enable = 1.0;
-        set(&mut parameters);
-        let sheath = SheathCorrection::new(&parameters).unwrap();
-        move |wanted: Wanted| sheath.lead(wanted.omega, wanted.theta, wanted.torque_in, wanted.torque_out)
+    let on = |set: fn(&mut Parameters)| {
+        move |parameters: &mut Parameters| {
+            parameters.sheath.adapts = 0.0;
+            parameters.correction.sheath.enable = 1.0;
+            set(parameters);
+        }
     };
-    let all = [0.1, 0.2, 0.5].as_slice();
-    check_led(effect("bending_friction", &[]), all, sheath(|p| p.correction.sheath.bending = 0.6));
+    let motion = &motions()[..1];
+    check(effect("bending_friction", &[]), on(|p| p.correction.sheath.bending = 0.6), Mode::Position, motion);
     let viscous = effect("sheath_viscous_friction", &[("viscous_n_s_per_m", 200.0)]);
-    check_led(viscous, all, sheath(|p| p.correction.sheath.viscous = 200.0));
-    for (asymmetry, set) in [
-        (0.4, (|p| p.correction.sheath.asymmetry = 0.4) as fn(&mut Parameters)),
-        (-0.4, |p| p.correction.sheath.asymmetry = -0.4),
-    ] {
-        check_led(effect("asymmetric_friction", &[("asymmetry", asymmetry)]), all, sheath(set));
-    }
-    check_led(
-        effect("wrap_angle_varies_with_pose", &[]),
-        all,
-        sheath(|p| p.correction.sheath.pose_slope = 1.0),
-    );
-    // Where the friction falls off within less speed, the tendons stick and slip.
-    let falling = effect("sheath_stribeck_friction", &[("static_ratio", 1.4), ("speed_m_s", 0.01)]);
-    check_led(
-        falling,
-        &[0.1, 0.2],
-        sheath(|p| (p.correction.sheath.excess, p.correction.sheath.speed) = (0.4, 0.01)),
-    );
+    check(viscous, on(|p| p.correction.sheath.viscous = 200.0), Mode::Position, motion);
 }

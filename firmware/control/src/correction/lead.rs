@@ -3,8 +3,10 @@
 //!
 //! A target that jumps at a reversal would otherwise be followed with the lag of the position loop.
 
+use super::backlash::Backlash;
+use super::sheath::SheathCorrection;
 use crate::parameters::Parameters;
-use crate::scale::{Angle, Gain, Quantity, Speed};
+use crate::scale::{Angle, Gain, Quantity, Speed, Torque};
 
 /// Rate of the lead: configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +23,59 @@ impl LeadConfig {
         let rate_hz = parameters.tick_rate_hz();
         let step = Angle::from_f32(parameters.compensator.rate_limit / rate_hz);
         Some(Self { step: step.max(Angle::from_bits(1)), rate: Gain::new(rate_hz)? })
+    }
+}
+
+/// Leads for play and for sheath friction beyond `mu K`, together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leads {
+    backlash: Backlash,
+    /// None where the friction is followed while the joint moves: it would count twice.
+    sheath: Option<SheathCorrection>,
+    /// `m g l`: torque that the weight takes at a small angle. Measured torque is zero within a play.
+    weight: Gain<Angle, Torque>,
+}
+
+/// Desired motion of the joint, and the friction on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Led {
+    /// Desired speed of the joint.
+    pub speed: Speed,
+    /// Desired angle of the joint.
+    pub theta: Angle,
+    /// Friction torque of the sheaths at the joint.
+    pub friction: Torque,
+}
+
+impl Leads {
+    /// The leads of these parameters; `None` if a value is beyond what fixed point holds.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Option<Self> {
+        /// Gravity, m/s².
+        const GRAVITY_M_PER_S2: f32 = 9.806_65;
+        let sheath = SheathCorrection::new(parameters)?;
+        let followed = parameters.sheath.adapts == 1.0;
+        let load = &parameters.load;
+        Some(Self {
+            backlash: Backlash::new(parameters)?,
+            sheath: (!followed).then_some(sheath),
+            weight: Gain::new(load.mass * GRAVITY_M_PER_S2 * load.arm)?,
+        })
+    }
+
+    /// Angle by which the input pulley leads.
+    #[inline]
+    #[must_use]
+    pub fn lead(&self, led: &Led) -> Angle {
+        let Led { speed, theta, friction } = *led;
+        let torque_out = self.weight.apply(theta);
+        let signed = if speed < Speed::ZERO { friction.negated() } else { friction };
+        let torque_in = torque_out.plus(signed);
+        let lead = self.backlash.lead(torque_in, torque_out);
+        match &self.sheath {
+            Some(sheath) => lead.plus(sheath.lead(speed, theta, torque_in, torque_out)),
+            None => lead,
+        }
     }
 }
 

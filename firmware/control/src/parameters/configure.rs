@@ -12,7 +12,7 @@ use crate::correction::MotorCorrection;
 use crate::correction::dead_zone::DeadZone;
 use crate::correction::eccentricity::Eccentricity;
 use crate::correction::joint::JointCorrection;
-use crate::correction::lead::LeadConfig;
+use crate::correction::lead::{LeadConfig, Leads};
 use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::encoder::multi_turn::StepLimit;
 use crate::encoder::stuck::StuckConfig;
@@ -55,6 +55,7 @@ pub struct TickConfig {
     pub(crate) eccentricity: [Eccentricity; 2],
     pub(crate) joint: JointCorrection,
     pub(crate) lead: LeadConfig,
+    pub(crate) leads: Leads,
 }
 
 impl TickConfig {
@@ -85,6 +86,7 @@ impl TickConfig {
             eccentricity,
             joint: joint_correction,
             lead,
+            leads,
         } = other;
         self.rate_hz = *rate_hz;
         self.encoder[0] = *input;
@@ -109,6 +111,7 @@ impl TickConfig {
         self.eccentricity = *eccentricity;
         self.joint = *joint_correction;
         self.lead = *lead;
+        self.leads = *leads;
     }
 }
 
@@ -180,6 +183,7 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         supervisor: supervisor(parameters, period_s),
         eccentricity: Eccentricity::of_both(parameters),
         joint: JointCorrection::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
+        leads: Leads::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
         lead: LeadConfig::new(parameters).ok_or_else(|| conflict("compensator.rate_limit"))?,
     })
 }
@@ -395,6 +399,8 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
             (count_part * count_part / 12.0 * COUNT_TIME_S / period_s).max(TENSION_VARIANCE)
         }
     };
+    let backlash = &parameters.correction.backlash;
+    let play_rad = backlash.enable * (backlash.transmission_gap + ratio * backlash.joint_gap);
     let filter_s = if fitted == Fitted::Nothing { CURRENT_FILTER_S } else { TENSION_FILTER_S };
     let rate = 0.5 * parameters.sheath.exponent_rate;
     Ok(SheathConfig {
@@ -406,6 +412,7 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
         per_tension: gain(0.5 / tendon.pretension, "tendon.pretension")?,
         stretch: gain(stretch_nm, "tendon.axial_stiffness")?,
         zone: gain(ZONE_MARGIN * half_zone_rad, "tendon.axial_stiffness")?,
+        play: Angle::from_f32(0.5 * ZONE_MARGIN * play_rad),
         half_zone: gain(half_zone_rad, "tendon.axial_stiffness")?,
         angle_ratio: gain(ratio, "pulley.output_radius")?,
         torque_ratio: gain(ratio, "pulley.output_radius")?,
