@@ -345,4 +345,37 @@ fn sheath_friction_beyond_the_nominal_one_is_led() {
     check(effect("bending_friction", &[]), on(|p| p.correction.sheath.bending = 0.6), Mode::Position, motion);
     let viscous = effect("sheath_viscous_friction", &[("viscous_n_s_per_m", 200.0)]);
     check(viscous, on(|p| p.correction.sheath.viscous = 200.0), Mode::Position, motion);
+    for (asymmetry, set) in [
+        (0.4, (|p| p.correction.sheath.asymmetry = 0.4) as fn(&mut Parameters)),
+        (-0.4, |p| p.correction.sheath.asymmetry = -0.4),
+    ] {
+        check(effect("asymmetric_friction", &[("asymmetry", asymmetry)]), on(set), Mode::Position, motion);
+    }
+    let pose = on(|p| p.correction.sheath.pose_slope = 1.0);
+    check(effect("wrap_angle_varies_with_pose", &[]), pose, Mode::Position, motion);
+    // Where the friction falls off within less speed, the tendons stick and slip.
+    let falling = effect("sheath_stribeck_friction", &[("static_ratio", 1.4), ("speed_m_s", 0.01)]);
+    let excess = on(|p| (p.correction.sheath.excess, p.correction.sheath.speed) = (0.4, 0.01));
+    check(falling, excess, Mode::Position, motion);
+}
+
+#[test]
+fn a_spring_that_is_not_there_does_not_push_the_joint_out_of_its_range() {
+    let mut parameters = Parameters::default();
+    parameters.limits.angle_maximum = 0.2;
+    let own = &mut parameters.correction.joint_spring;
+    // Stiffer than the weight, 0.736 N·m/rad: without the range it would carry the joint to 0.75 rad.
+    (own.enable, own.stiffness) = (1.0, 2.0);
+    let mut bench = Bench::ready(parameters, joint());
+    bench.refer(Reference::Hold(0.1));
+    bench.order(Goal::Run(Mode::Torque));
+    let (mut told, mut largest) = (false, 0.0_f64);
+    for _ in 0..30_000 {
+        told |= bench.tick().sample.limits.contains(bowden_link::Limit::ReferenceRange);
+        largest = largest.max(bench.plant.theta_out_rad());
+    }
+    // It comes to the limit with some speed, and swings back.
+    assert!(told && largest < 0.4, "{told}, {largest} rad");
+    assert!(bench.plant.theta_out_rad() < 0.27, "{} rad in the end", bench.plant.theta_out_rad());
+    assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
 }
