@@ -7,11 +7,7 @@
 mod bench;
 
 use bench::{Bench, joint};
-use bowden_control::correction::backlash::Backlash;
-use bowden_control::correction::lead::{Lead, LeadConfig};
-use bowden_control::correction::sheath::SheathCorrection;
 use bowden_control::parameters::Parameters;
-use bowden_control::scale::{Angle, Quantity, Speed, Torque};
 use bowden_control::tick::Command;
 use bowden_control::tick_config;
 use bowden_link::State;
@@ -325,7 +321,6 @@ fn play_is_crossed() {
         let on = |parameters: &mut Parameters| {
             let own = &mut parameters.correction.backlash;
             (own.enable, own.transmission_gap, own.joint_gap) = (1.0, gaps[0], gaps[1]);
-            parameters.sheath.adapts = 0.0;
         };
         check(effect(id, &[("gap_rad", 0.02)]), on, Mode::Position, &motions()[..1]);
     }
