@@ -45,7 +45,7 @@ pub struct TrackingSetup {
 /// | frequency | the paper's own in sections 4.1 and 4.2; section 5.2 names none |
 /// | pretension | the paper's own in section 3.2 |
 /// | friction coefficient | dry, [`crate::friction::DRY`] |
-/// | arm, tendon, amplitude | so that the error without compensation is the paper's at both loads |
+/// | arm, tendon, amplitude | so that the error without compensation is the paper's at both loads, and with it as near as can be |
 ///
 /// Only L/EA counts, and EA is that of a solid wire of 0.8 mm. A rope has about 0.55 of that cross-section: 3.5 m here are
 /// 1.9 m of it.

@@ -17,9 +17,11 @@
 //! | [`disturbed_tracking`] | section 5.2, Fig. 11 and 12: setup and runner |
 //! | [`tracking_methods`] | the ways to control the joint that are compared there |
 //! | [`tracking_prediction`] | what the equations make of it |
+//! | [`alternative_arms`] | other constants that fit there |
 //! | [`page`], [`plots`] | `host-tools/docs/paper.md` and its figures |
 #![forbid(unsafe_code)]
 
+pub mod alternative_arms;
 pub mod disturbed_tracking;
 pub mod driven_joint;
 pub mod efficiency;

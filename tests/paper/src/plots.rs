@@ -51,8 +51,8 @@ pub fn line<T>(name: impl Into<String>, samples: &[T], point: impl Fn(&T) -> (f6
 
 /// Range of values with a twentieth of room at either end, and at the upper one room for a key.
 fn range(values: impl Iterator<Item = f64>, key_lines: usize) -> Range<f64> {
-    // A line of the key is 20 px of the 330 px that a panel's plot is high.
-    const KEY_LINE: f64 = 0.065;
+    // A line of the key is 20 px of the 330 px that a panel's plot is high, and its frame as much again.
+    const KEY_LINE: f64 = 0.1;
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
     let length = (high - low).max(1e-9);
     low - 0.05 * length..high + (0.05 + KEY_LINE * key_lines as f64) * length
