@@ -1,6 +1,7 @@
 //! Section of Fig. 11 and 12.
 
 use std::f64::consts::{FRAC_2_PI, TAU};
+use std::fmt::Write as _;
 
 use bowden_link::message::Mode;
 use virtual_bench::BenchConfig;
@@ -144,8 +145,10 @@ fn arms() -> Result<String, String> {
         let [arm_m, tendon_m, amplitude_rad] = errors.arm;
         let [heavy, light] = errors.uncompensated_percent;
         let [heavy_after, light_after] = errors.compensated_percent;
-        table += &format!(
-            "| {arm_m} m, {tendon_m} m, {amplitude_rad} rad | {heavy:.1} and {light:.1} % | {heavy_after:.1} and {light_after:.1} % |\n"
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            table,
+            "| {arm_m} m, {tendon_m} m, {amplitude_rad} rad | {heavy:.1} and {light:.1} % | {heavy_after:.1} and {light_after:.1} % |"
         );
     }
     Ok(table)
