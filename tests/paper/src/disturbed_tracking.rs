@@ -120,10 +120,6 @@ impl TrackingSetup {
     #[must_use]
     pub fn parameters(&self, mass_kg: f64) -> Parameters {
         let mut parameters = parameters_of(&self.bench(mass_kg));
-        // The plausibility check of the end tensions knows the wrap angle of the sheaths at rest: without more room it would
-        // stop the joint with fault 13 whenever they are bent more, which is what this experiment does.
-        let widest = self.friction_coefficient * self.sheath.span_rad;
-        parameters.tension.exponent_margin += widest as f32;
         // The compensation may be as large as the angle itself.
         parameters.compensator.size_limit = (2.0 * self.amplitude_rad) as f32;
         parameters

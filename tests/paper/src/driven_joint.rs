@@ -73,6 +73,9 @@ pub fn parameters_of(bench: &BenchConfig) -> Parameters {
     parameters.tendon.pretension = bench.pretension_n as f32;
     parameters.sheath.friction_coefficient = bench.friction_coefficient as f32;
     parameters.sheath.wrap_angle = bench.wrap_angle_rad as f32;
+    parameters.load.mass = bench.mass_kg as f32;
+    parameters.load.arm = bench.arm_m as f32;
+    parameters.load.inertia = bench.load_inertia_kg_m2 as f32;
     parameters
 }
 

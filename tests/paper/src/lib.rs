@@ -15,6 +15,7 @@
 //! | [`sheath_motion`] | the sheaths moved at random |
 //! | [`tracking_error`] | average torque tracking error, position error |
 //! | [`disturbed_tracking`] | section 5.2, Fig. 11 and 12: setup and runner |
+//! | [`beyond`] | the same with a controller that follows the friction of the sheaths |
 //! | [`tracking_methods`] | the ways to control the joint that are compared there |
 //! | [`tracking_prediction`] | what the equations make of it |
 //! | [`alternative_arms`] | other constants that fit there |
@@ -22,6 +23,7 @@
 #![forbid(unsafe_code)]
 
 pub mod alternative_arms;
+pub mod beyond;
 pub mod disturbed_tracking;
 pub mod driven_joint;
 pub mod efficiency;

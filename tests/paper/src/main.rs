@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use bowden_paper::error::ExperimentError;
 use bowden_paper::page::{self, Section};
-use bowden_paper::{efficiency, lubrication_and_radius, torque_phases};
+use bowden_paper::{beyond, efficiency, lubrication_and_radius, torque_phases};
 use clap::Parser;
 
 /// Run the experiments of Wu et al., Sensors 2020, 20(5), 1301, on the virtual bench under the firmware's control
@@ -20,6 +20,10 @@ struct Options {
     /// Date and commit that the page names
     #[arg(long, value_name = "TEXT", default_value = "date and commit not given")]
     provenance: String,
+    /// Instead, track with the controller that follows the friction of the sheaths, over this many of their motions; the
+    /// page goes beside the other as tracking.md
+    #[arg(long, value_name = "SEEDS", num_args = 0..=1, default_missing_value = "50")]
+    beyond: Option<u64>,
 }
 
 fn main() -> ExitCode {
@@ -34,6 +38,15 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), String> {
     let told = |error: ExperimentError| error.to_string();
+    if let Some(seeds) = options.beyond {
+        let table = beyond::table(seeds).map_err(told)?;
+        println!("{table}");
+        if let Some(path) = options.page.as_ref().map(|page| page.with_file_name("tracking.md")) {
+            page::write_tracking(&table, &options.provenance, &path)?;
+            println!("{}", path.display());
+        }
+        return Ok(());
+    }
     let mut sections = Vec::new();
     let mut add = |section: Section| {
         println!("{}\n\n{}", section.heading, section.table());

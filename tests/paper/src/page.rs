@@ -81,6 +81,27 @@ pub fn write(sections: &[Section], provenance: &str, page: &Path) -> Result<(), 
     fs::write(page, render(sections, provenance, &name)).map_err(|error| told(page, &error))
 }
 
+/// Writes the page of [`crate::beyond`].
+///
+/// # Errors
+/// When the file cannot be written, and why.
+pub fn write_tracking(table: &str, provenance: &str, page: &Path) -> Result<(), String> {
+    let text = format!(
+        "# Tracking while the sheaths are moved, without retuning\n\n\
+         What a joint reaches when its controller follows the friction of the sheaths\n\
+         ([how](../../firmware/control/docs/sheath-observer.md)). Task, loads and motions of the sheaths are those of section \
+         5.2 of\n[the paper's experiments](paper.md): the firmware's own code drives the virtual bench while K wanders between \
+         pi/2 and 3 pi/2.\n\n\
+         `cargo xtask paper --beyond` wrote this page: {provenance}.\n\n\
+         *Removed* is the part of the error without compensation that is gone, seed by seed. Parameters are the same for \
+         both loads;\nthose of a sensor set were chosen on seeds 1 to 3, the figures come from seeds {} on. The first two \
+         sets run in position\nmode with `compensator.source` 3, the last in torque mode. A run that the supervisor stops counts \
+         as nothing removed.\n\n{table}",
+        crate::beyond::FIRST_SEED
+    );
+    fs::write(page, text).map_err(|error| format!("{}: {error}", page.display()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
