@@ -49,7 +49,8 @@ fn random_references_are_refused_or_run() {
     let mut lowest_n = f64::MAX;
     for session in 0..SESSIONS {
         let mode = if session % 3 == 2 { Mode::Torque } else { Mode::Position };
-        let (parameters, joint) = loaded(random.between(0.1, 3.0));
+        let (mut parameters, joint) = loaded(random.between(0.1, 3.0));
+        parameters.control.rate_divider = [2.0, 1.0, 2.0, 5.0, 2.0, 10.0][session % 6];
         let mut bench = Bench::ready(parameters.clone(), joint);
         bench.order(Goal::Run(mode));
         for _ in 0..CASES {

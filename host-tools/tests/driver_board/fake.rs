@@ -379,8 +379,8 @@ impl Fake {
                     Reference::Stream => 0.0,
                     Reference::Generated { amplitude, offset, .. } => amplitude.abs() + offset.abs(),
                 };
-                if largest > 10.0 {
-                    return Err(Refusal::OutOfRange { got: largest, minimum: -10.0, maximum: 10.0 });
+                if largest > 0.8 {
+                    return Err(Refusal::OutOfRange { got: largest, minimum: -0.8, maximum: 0.8 });
                 }
                 self.streaming = *reference == Reference::Stream;
             }

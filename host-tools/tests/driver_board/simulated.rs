@@ -192,8 +192,10 @@ fn a_simulated_board_has_parameters_and_states_of_its_own() {
 #[test]
 fn a_fault_of_the_control_itself_ends_the_recording_in_its_tick() {
     let folder = tempfile::tempdir().unwrap();
-    // At rest the ends carry 30 N, in motion one of them soon less than 25 N.
-    let parameters = "schema = \"bowden-parameters/1\"\n[tension]\nslack = 25.0\n";
+    // At rest the ends carry 30 N, in motion one of them soon less than 20 N; a board that knows of no friction and of a
+    // higher pretension does not expect that.
+    let parameters = "schema = \"bowden-parameters/1\"\n[tension]\nslack = 20.0\nexponent_margin = 0.6\n\
+                      [tendon]\npretension = 35.0\n[sheath]\nfriction_coefficient = 0.0\n";
     fs::write(folder.path().join("p.toml"), parameters).unwrap();
     let arguments = ["--out", "a.csv", "--seconds", "2", "--reference", "sine", "--parameters", "p.toml"];
     let (status, stdout, stderr) =
@@ -203,7 +205,7 @@ fn a_fault_of_the_control_itself_ends_the_recording_in_its_tick() {
     let tick = (recording.t_s().last().unwrap() * 1e4).round();
     assert!(stderr.starts_with("bowden: fault 11, f"), "{stderr}");
     assert!(
-        stderr.contains(&format!("limit 25.0000 N) at tick {tick}; restore the pretension; a.csv: ")),
+        stderr.contains(&format!("limit 20.0000 N) at tick {tick}; restore the pretension; a.csv: ")),
         "{stderr}"
     );
     let enabled = recording.channel(Channel::DriveEnable).unwrap();
@@ -211,11 +213,86 @@ fn a_fault_of_the_control_itself_ends_the_recording_in_its_tick() {
     // Where the tension was below the limit, it had been for the debounce of 1 ms.
     let slack = [Channel::F1, Channel::F2, Channel::F3, Channel::F4].into_iter().any(|channel| {
         let tension = recording.channel(channel).unwrap();
-        tension[tension.len() - 5..].iter().all(|tension| *tension < 25.0)
+        tension[tension.len() - 5..].iter().all(|tension| *tension < 20.0)
     });
     assert!(slack);
     let saved = fs::read_to_string(folder.path().join("a.parameters.toml")).unwrap();
-    assert!(saved.contains("\ntension.slack = 25.0  # N"), "{saved}");
+    assert!(saved.contains("\ntension.slack = 20.0  # N"), "{saved}");
+}
+
+#[test]
+fn every_form_runs_at_the_default_amplitude() {
+    let folder = tempfile::tempdir().unwrap();
+    for reference in ["sine", "triangle", "multisine", "staircase"] {
+        let out = format!("{reference}.csv");
+        let arguments =
+            ["--home", "--amplitude", "0.3", "--frequency", "0.5", "--seconds", "2.5", "--every", "10"];
+        let command = ["record", "--port", "sim", "--out", &out, "--reference", reference];
+        let (status, _, stderr) = bowden(folder.path(), &[command.as_slice(), arguments.as_slice()].concat());
+        assert_eq!((status, stderr.as_str()), (0, ""), "{reference}");
+        let recording = Recording::load(&folder.path().join(&out), &ReadOptions::default()).unwrap();
+        let largest = |channel| {
+            recording
+                .channel(channel)
+                .unwrap()
+                .iter()
+                .fold(0.0_f64, |largest, value| largest.max(value.abs()))
+        };
+        // Shaped, but not much smaller.
+        let (asked, reached) = (largest(Channel::ThetaRef), largest(Channel::ThetaOut));
+        assert!(
+            (0.28..0.301).contains(&asked) && (0.28..0.32).contains(&reached),
+            "{reference}: {asked}, {reached}"
+        );
+        let slack = [Channel::F1, Channel::F2, Channel::F3, Channel::F4]
+            .into_iter()
+            .any(|channel| recording.channel(channel).unwrap().iter().any(|tension| *tension < 2.0));
+        assert!(!slack, "{reference}");
+    }
+}
+
+#[test]
+fn what_the_joint_cannot_do_is_refused_in_one_line_before_anything_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("ref.csv"), "t_s,theta_ref_rad\n0,0\n0.5,0.4\n1,1.5\n").unwrap();
+    for (arguments, expected) in [
+        (
+            vec!["sine", "--amplitude", "99"],
+            "--amplitude 99: the joint can do 0.8731 rad at most at 0.5 Hz around 0 rad; lower it or the frequency",
+        ),
+        (vec!["multisine", "--frequency", "6"], "--amplitude 0.3: the joint can do 0.0004"),
+        (
+            vec!["sine", "--frequency", "200"],
+            "--frequency 200: the board can do 0.001 to 100 Hz; choose one within it",
+        ),
+        (
+            vec!["sine", "--offset", "1"],
+            "--offset 1: the joint can do -0.8731 to 0.8731 rad; choose a value within it",
+        ),
+        (
+            vec!["hold", "--offset", "-1.1"],
+            "--offset -1.1: the joint can do -0.8731 to 0.8731 rad; choose a value within it",
+        ),
+        (
+            vec!["hold", "--mode", "torque", "--offset", "0.9"],
+            "--offset 0.9: the joint can do -0.5935 to 0.5935 N·m; choose",
+        ),
+        (
+            vec!["ref.csv"],
+            "--reference ref.csv: 1.5 rad at 1 s, the joint can do -0.8731 to 0.8731 rad; scale the reference",
+        ),
+    ] {
+        let command = [
+            &["record", "--port", "sim", "--out", "a.csv", "--seconds", "1", "--reference"],
+            arguments.as_slice(),
+        ]
+        .concat();
+        let (status, stdout, stderr) = bowden(folder.path(), &command);
+        assert_eq!((status, stdout.as_str()), (2, ""), "{arguments:?}");
+        assert!(stderr.starts_with(&format!("bowden: {expected}")), "{arguments:?}: {stderr}");
+        assert_eq!(stderr.lines().count(), 1);
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 #[test]

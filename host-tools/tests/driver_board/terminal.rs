@@ -166,17 +166,32 @@ fn a_fault_during_the_run_is_reported_and_keeps_the_recording() {
 }
 
 #[test]
-fn a_refusal_is_reported_and_leaves_no_file() {
+fn a_reference_that_the_joint_cannot_do_is_not_even_sent() {
     let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["--out", "a.csv", "--seconds", "1", "--reference", "sine", "--amplitude", "40"];
+    let arguments =
+        ["--out", "a.csv", "--seconds", "1", "--reference", "sine", "--amplitude", "40", "--home"];
+    let (status, stdout, stderr) = terminal.bowden(folder.path(), "record", &arguments);
+    assert_eq!((status, stdout.as_str()), (2, ""));
+    assert!(stderr.starts_with("bowden: --amplitude 40: the joint can do 0."), "{stderr}");
+    let fake = terminal.fake();
+    let moves = |message: &ToBoard| matches!(message, ToBoard::Enter(_) | ToBoard::SetReference(_));
+    assert_eq!((fake.state, fake.count(moves)), (State::Off, 0));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn what_the_board_refuses_is_told_and_nothing_is_left() {
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--out", "a.csv", "--seconds", "1", "--reference", "sine", "--amplitude", "0.85"];
     let (status, stdout, stderr) = terminal.bowden(folder.path(), "record", &arguments);
     assert_eq!(
         (status, stdout.as_str(), stderr.as_str()),
         (
             2,
             "",
-            "bowden: the board refused the reference: 40 is out of range, expected -10 to 10; choose a value within it\n"
+            "bowden: the board refused the reference: 0.85 is out of range, expected -0.8 to 0.8; choose a value within it\n"
         )
     );
     assert_eq!(terminal.fake().state, State::Off);
