@@ -151,7 +151,7 @@ impl ReferenceState {
         let from = self.shaper.value();
         let points = [self.value_bits(); 2];
         let mut shaper = self.shaper;
-        shaper.restart(from);
+        shaper.restart();
         let wide = |value: i32| i64::from(value) << EXTRA_BITS;
         let [low, high] = match config.origin {
             Origin::Here => [from; 2],
@@ -258,8 +258,7 @@ mod tests {
     /// Range ±2 and, at 10 kHz, so much a second, a second² and a second³.
     fn bounds(speed: f32, acceleration: f32, jerk: f32) -> ReferenceBounds {
         let tick = |value: f32, power: i32| value * 1e-4_f32.powi(power) * 1_099_511_627_776.0;
-        let speed = (tick(speed, 1) / 256.0) as u32;
-        let limits = ShaperLimits::new(speed, tick(acceleration, 2), 0.0, tick(jerk, 3));
+        let limits = ShaperLimits::new(tick(speed, 1), tick(acceleration, 2), 0.0, tick(jerk, 3));
         ReferenceBounds { range: [-2 * ONE, 2 * ONE], limits }
     }
 

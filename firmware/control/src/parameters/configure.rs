@@ -47,8 +47,8 @@ pub struct TickConfig {
     pub(crate) torque: TorqueConfig,
     pub(crate) drive: DriveConfig,
     pub(crate) angle_bounds: ReferenceBounds,
-    /// Largest speed of homing, 2⁻³² a tick.
-    pub(crate) homing_speed: u32,
+    /// Largest speed of homing, as that of [`ShaperLimits`].
+    pub(crate) homing_speed: i32,
     pub(crate) torque_bounds: ReferenceBounds,
     pub(crate) torque_window: TorqueWindow,
     pub(crate) supervisor: SupervisorConfig,
@@ -136,15 +136,10 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
     let shaped = |speed: f32, acceleration: f32, gravity: f32, jerk: f32| {
         /// Scale of the shaper.
         const ONE: f32 = (1_u64 << 40) as f32;
-        let square_s2 = period_s * period_s;
-        let acceleration = [acceleration, gravity].map(|value| value * square_s2 * ONE);
-        ShaperLimits::new(
-            phase_step(speed * period_s),
-            acceleration[0],
-            acceleration[1],
-            jerk * square_s2 * period_s * ONE,
-        )
+        let tick = [1, 2, 3].map(|power| libm::powf(period_s, power as f32) * ONE);
+        ShaperLimits::new(speed * tick[0], acceleration * tick[1], gravity * tick[1], jerk * tick[2])
     };
+    let angle = |speed: f32| shaped(speed, reach.acceleration, reach.gravity, reach.jerk);
     let range = |ends: [f32; 2]| ends.map(|end| Angle::from_f32(end).to_bits());
     Ok(TickConfig {
         rate_hz: parameters.tick_rate_hz() as u16,
@@ -165,11 +160,8 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         position: position(parameters, period_s)?,
         torque: torque(parameters, period_s)?,
         drive: drive(parameters)?,
-        angle_bounds: ReferenceBounds {
-            range: range(reach.angle),
-            limits: shaped(reach.speed, reach.acceleration, reach.gravity, reach.jerk),
-        },
-        homing_speed: phase_step(parameters.supervisor.homing_speed.min(reach.speed) * period_s),
+        angle_bounds: ReferenceBounds { range: range(reach.angle), limits: angle(reach.speed) },
+        homing_speed: angle(parameters.supervisor.homing_speed.min(reach.speed)).speed,
         torque_bounds: ReferenceBounds {
             range: range([-reach.torque, reach.torque]),
             limits: shaped(reach.torque_rate, reach.torque_acceleration, 0.0, reach.torque_jerk),

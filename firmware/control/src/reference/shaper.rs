@@ -1,6 +1,7 @@
 //! Shapes a reference: limits its speed, acceleration and jerk, without lag where the goal stays within them.
 //!
-//! State: value `x`, speed `v`, acceleration `a`, per tick, in 2⁻⁴⁰. Each tick adds a jerk `u` to `a`, `a` to `v`, `v` to `x`.
+//! State: value `x`, speed `v`, acceleration `a`, per tick, in units of the largest jerk `j`. Each tick adds a jerk `u` to
+//! `a`, `a` to `v`, `v` to `x`.
 //!
 //! | case | rule |
 //! |---|---|
@@ -20,35 +21,40 @@
 //! | with any `a` | `w²/(2 A) + w A/(2 j) − A³/(24 j²)` | `2 w ≥ A²/j` |
 //! | | `√(8 w³/(9 j))` | else |
 //!
-//! Distances are compared without root or division: everything is divided by `j` (a product with its inverse), and both
-//! sides are squared, or multiplied by `2 A`.
+//! Distances are compared without root or division: in units of `j` both sides are squared, or multiplied by `2 A`.
 
-/// Bits behind the point of an acceleration over the jerk, in ticks.
+/// Bits behind the point of the state, in units of the jerk: ticks, ticks², ticks³.
+const STATE_BITS: u32 = 12;
+
+/// Bits behind the point of an acceleration in a comparison, ticks.
 const RISE_BITS: u32 = 4;
 
-/// Bits behind the point of the inverse of the jerk's mantissa.
-const INVERSE_BITS: u32 = 28;
-
-/// Steps of the jerk by which a locked goal may deviate from a steady motion in a tick: corners between the points of a
-/// stream, the grid of the goal.
-const LOCKED_STEPS: i64 = 256;
-
-/// Distance over the jerk below which the grid of ticks shows, ticks³.
-const GRID: i64 = 16;
+/// From an acceleration of the state to one in a comparison.
+const RISE_SHIFT: u32 = STATE_BITS - RISE_BITS;
 
 /// Longest time in which the largest acceleration is reached, ticks.
 const LONGEST_RISE: i32 = 1024;
 
+/// Speed at which comparisons saturate, ticks².
+const LARGEST: i64 = 1 << 27;
+
+/// Distance, ticks³, by which a locked goal may miss what the filter expected: 512 for a goal with the largest jerk, and corners
+/// between the points of a stream.
+const LOCKED_STEPS: i32 = 768;
+
+/// Distance below which the grid of ticks shows, ticks³.
+const GRID: i64 = 16;
+
 /// Limits of a reference, as the tick needs them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShaperLimits {
-    /// Largest speed, 2⁻³² a tick.
-    pub speed: u32,
-    /// Largest jerk, 2⁻⁴⁰ a tick³; at least 8.
+    /// Largest speed over the jerk, ticks².
+    pub speed: i32,
+    /// Largest jerk, 2⁻⁴⁰ a tick³.
     pub jerk: i32,
-    /// `2^(shift + 28) / jerk`, rounded down.
-    pub inverse: u32,
-    /// Bits of `jerk` less one.
+    /// `2^(shift + 36) / jerk`, rounded down: from 2⁻⁴⁰ to the state.
+    pub scale: u32,
+    /// Bits of the jerk less five.
     pub shift: u8,
     /// Largest acceleration over the jerk, 1/16 tick, at most 1024 ticks.
     pub rise: u16,
@@ -57,66 +63,60 @@ pub struct ShaperLimits {
 }
 
 impl ShaperLimits {
-    /// Limits per tick: `speed` in 2⁻³², `acceleration` and `gravity` in 2⁻⁴⁰, `jerk` in 2⁻⁴⁰.
+    /// Limits per tick, in 2⁻⁴⁰.
     ///
     /// The acceleration is lowered to what the jerk reaches in 1024 ticks, the jerk to what reaches the acceleration in
-    /// 8; the jerk is at least 8, below which the resolution of the state would show.
+    /// 8; the jerk is at least 64, below which the resolution of the value would show.
     #[must_use]
-    pub fn new(speed: u32, acceleration: f32, gravity: f32, jerk: f32) -> Self {
-        const LEAST_JERK: f32 = 8.0;
+    pub fn new(speed: f32, acceleration: f32, gravity: f32, jerk: f32) -> Self {
+        const LEAST_JERK: f32 = 64.0;
         const SHORTEST_RISE: f32 = 8.0;
         const LARGEST_JERK: f32 = 1_073_741_824.0;
         let jerk = jerk.min(acceleration / SHORTEST_RISE).clamp(LEAST_JERK, LARGEST_JERK) as i32;
-        let shift = 31 - jerk.leading_zeros();
+        let shift = 27 - jerk.leading_zeros();
         let ticks = |value: f32| {
             let ticks = value / jerk as f32 * (1_u32 << RISE_BITS) as f32;
             ticks.max(0.0).min((LONGEST_RISE << RISE_BITS) as f32) as u16
         };
-        let rise = ticks(acceleration).max(1 << RISE_BITS);
         Self {
-            speed: speed.max(1),
+            speed: (speed / jerk as f32).max(1.0).min(LARGEST as f32) as i32,
             jerk,
-            inverse: ((1_u64 << (INVERSE_BITS + shift)) / u64::from(jerk.unsigned_abs())) as u32,
+            scale: ((1_u64 << (36 + shift)) / u64::from(jerk.unsigned_abs())).min(u64::from(u32::MAX)) as u32,
             shift: shift as u8,
-            rise,
+            rise: ticks(acceleration).max(1 << RISE_BITS),
             gravity: ticks(gravity),
         }
     }
 
-    /// `value` over the jerk, rounded down, saturated at 2³⁴.
+    /// `value`, at most 2⁵¹ of 2⁻⁴⁰, in units of the state.
     #[inline]
-    fn over_jerk(&self, value: i64) -> i64 {
-        const BEYOND: i64 = 1 << 34;
-        let high = (value >> self.shift).clamp(-BEYOND, BEYOND);
-        (high * i64::from(self.inverse)) >> INVERSE_BITS
+    fn state_of(&self, value: i64) -> i64 {
+        let wide = value << 8;
+        let (low, high) = (wide & 0xffff_ffff, wide >> 32);
+        let scale = i64::from(self.scale);
+        // 96 bits less the lowest 32; the product of the low halves is without sign.
+        let product = high * scale + ((low.cast_unsigned() * u64::from(self.scale)) >> 32).cast_signed();
+        product >> self.shift
     }
 
-    /// `speed` over the jerk, ticks², saturated.
+    /// `state`, in 2⁻⁴⁰.
     #[inline]
-    fn ticks_of(&self, speed: i64) -> i32 {
-        const BEYOND: i64 = 1 << 28;
-        self.over_jerk(speed).clamp(-BEYOND, BEYOND) as i32
+    fn value_of(&self, state: i64) -> i64 {
+        ((state >> 4) * i64::from(self.jerk)) >> (STATE_BITS - 4)
     }
 
-    /// `acceleration` over the jerk, 1/16 tick, saturated at twice the longest rise.
-    #[inline]
-    fn rise_of(&self, acceleration: i64) -> i32 {
-        const BEYOND: i64 = (LONGEST_RISE as i64) << (RISE_BITS + 1);
-        self.over_jerk(acceleration << RISE_BITS).clamp(-BEYOND, BEYOND) as i32
-    }
-
-    /// Largest acceleration at `value` away from zero, 1/16 tick: gravity grows as `sin θ`, which `4 θ (π − θ)/π²` bounds
-    /// from above.
+    /// Largest acceleration at `value` (2⁻⁴⁰) away from zero, 1/16 tick: gravity grows as `sin θ`, which `4 θ (π − θ)/π²`
+    /// bounds from above.
     #[inline]
     fn outward(&self, value: i64) -> i32 {
-        /// π and π/2 in 2⁻²⁰, 4/π² in 2⁻³¹.
-        const PI: i64 = 3_294_199;
-        const QUARTER: i64 = 1_647_099;
-        const FACTOR: i64 = 870_342_461;
-        let angle = (value >> 20).abs().min(QUARTER);
-        let sine = (((angle * (PI - angle)) >> 20) * FACTOR) >> 31;
-        let left = i32::from(self.rise) - ((sine * i64::from(self.gravity)) >> 20) as i32;
-        left.max(1 << RISE_BITS)
+        /// π and π/2 in 2⁻¹⁴, 4/π² in 2⁻¹⁶.
+        const PI: u32 = 51_472;
+        const QUARTER: u32 = 25_736;
+        const FACTOR: u32 = 26_561;
+        let angle = ((value >> 26) as i32).unsigned_abs().min(QUARTER);
+        let sine = (((angle * (PI - angle)) >> 14) * FACTOR) >> 16;
+        let taken = (sine * u32::from(self.gravity)) >> 14;
+        (i32::from(self.rise) - taken.cast_signed()).max(1 << RISE_BITS)
     }
 }
 
@@ -132,54 +132,60 @@ struct Approach {
 }
 
 impl Approach {
+    /// Speed that comes until the acceleration is zero, ticks².
+    #[inline]
+    fn gain(rise: i32) -> i32 {
+        (rise * rise) >> (2 * RISE_BITS + 1)
+    }
+
     /// Whether it stops within the distance by a deceleration of `most` at most, 1/16 tick. `lenient` makes room for a goal
     /// that turns without coming to rest, as a sine does: `a³/(16 j²)`, and for the grid of ticks.
     #[inline]
     fn stops(self, most: i32, lenient: bool) -> bool {
-        /// 1/3 and 1/12 in 2⁻¹⁶.
-        const THIRD: i64 = 21_845;
-        const TWELFTH: i64 = 5461;
-        let (speed, rise) = (i64::from(self.speed), i64::from(self.rise));
-        let square = rise * rise;
-        let gain = square >> (2 * RISE_BITS + 1);
-        // Speed once the acceleration is zero.
+        /// 2/3 in 2⁻³².
+        const TWO_THIRDS: i64 = 2_863_311_531;
+        /// 1/12 in 2⁻¹⁶.
+        const TWELFTH: u64 = 5461;
+        let Self { speed, rise, distance } = self;
+        let gain = Self::gain(rise);
         let end = if rise < 0 { speed - gain } else { speed + gain };
         if speed <= 0 && end <= 0 {
             return true;
         }
-        let cube = (square * rise) >> (3 * RISE_BITS);
-        let way = ((speed * rise) >> RISE_BITS) + ((cube * THIRD) >> 16);
-        let mut left = self.distance - way;
+        // v a + a³/3, where a² is twice the gain.
+        let two_thirds = ((i64::from(gain) * TWO_THIRDS) >> 32) as i32;
+        let way = (i64::from(speed + two_thirds) * i64::from(rise)) >> RISE_BITS;
+        let mut left = distance - way;
         if lenient {
             left += GRID;
             if rise < 0 {
-                left += speed - (cube >> 4);
+                left += i64::from(speed) - ((i64::from(gain) * i64::from(rise)) >> (RISE_BITS + 3));
             }
         }
         if left < 0 {
             return false;
         }
-        let near = left.min(1 << 31);
-        let left_square = near * near;
-        let most = i64::from(most);
+        let left = u64::from(left.min(i64::from(i32::MAX)) as u32);
+        let most = u64::from(most.unsigned_abs());
         let most_square = (most * most) >> (2 * RISE_BITS);
         let room = (left * most) >> (RISE_BITS - 1);
-        let top = speed + gain;
+        let top = u64::from((speed + gain).unsigned_abs());
         if end > 0 {
             if top >= most_square {
                 top * (top + most_square) <= room
             } else {
-                top * top * top <= left_square
+                top * top * top <= left * left
             }
         } else if 2 * top >= most_square {
-            top * (top + most_square) - ((most_square * most_square * TWELFTH) >> 16) <= room
+            top * (top + most_square) <= room + ((most_square * most_square * TWELFTH) >> 16)
         } else {
-            top * top * top <= left_square + (left_square >> 3)
+            let square = left * left;
+            top * top * top <= square + (square >> 3)
         }
     }
 }
 
-/// Filter for the motion of a goal, 2⁻⁴⁰ per tick.
+/// Filter for the motion of a goal, in units of the state.
 #[derive(Clone, Copy, Debug, Default)]
 struct Goal {
     /// Goal of this tick.
@@ -188,9 +194,9 @@ struct Goal {
     held: bool,
     value: i64,
     speed: i64,
-    acceleration: i64,
-    /// Change of the acceleration a tick, low-passed.
-    jerk: i64,
+    acceleration: i32,
+    /// Change of the acceleration a tick, low-passed, 32 times.
+    jerk: i32,
 }
 
 impl Goal {
@@ -200,40 +206,72 @@ impl Goal {
 
     /// Takes the goal of this tick. Gains for a pole p of 7/8: `1 − p³`, `1.5 (1 − p²)(1 − p)`, `(1 − p)³`. The filter
     /// starts anew where the goal rests, steps or turns at a corner: where eight times the largest jerk does not explain it.
+    /// Returns whether the goal went on steadily: within [`LOCKED_STEPS`] of where the filter expected it.
     #[inline]
-    fn follow(&mut self, goal: i64, jerk: i64) {
+    fn follow(&mut self, goal: i64) -> bool {
         const GAIN_BITS: u32 = 9;
-        let value = self.value + self.speed + (self.acceleration >> 1);
+        const LARGEST_ERROR: i64 = 1 << (STATE_BITS + GAIN_BITS + 3);
+        let value = self.value + self.speed + i64::from(self.acceleration >> 1);
         let error = goal - value;
-        let raw_speed = goal - self.last;
-        let rests = raw_speed == 0 && self.held;
-        (self.last, self.held) = (goal, raw_speed == 0);
-        if rests || error.abs() >> (GAIN_BITS + 3) > jerk {
-            (self.value, self.speed, self.acceleration, self.jerk) = (goal, raw_speed, 0, 0);
-            return;
+        let change = goal - self.last;
+        let rests = change == 0 && self.held;
+        (self.last, self.held) = (goal, change == 0);
+        if rests || error.abs() > LARGEST_ERROR {
+            (self.value, self.speed, self.acceleration, self.jerk) = (goal, change, 0, 0);
+            return rests;
         }
-        self.value = value + ((error * 21) >> 6);
-        self.speed += self.acceleration + ((error * 45) >> 10);
-        let change = error >> GAIN_BITS;
-        self.acceleration += change;
-        self.jerk += (change - self.jerk) >> 5;
+        let error = error as i32;
+        self.value = value + i64::from((error * 21) >> 6);
+        self.speed += i64::from(self.acceleration + ((error * 45) >> 10));
+        let jerk = error >> GAIN_BITS;
+        self.acceleration += jerk;
+        self.jerk += jerk - (self.jerk >> 5);
+        error.abs() <= LOCKED_STEPS << STATE_BITS
     }
 
-    /// Speed half a tick ago, as the shaper counts it, and acceleration, without the lag of the filter behind a steady jerk
-    /// (157 ticks² and 22 ticks of it).
+    /// Motion without the lag of the filter behind a steady jerk: 157 ticks² of it for the speed, 22 ticks for the
+    /// acceleration. The speed is that of half a tick ago, as the shaper counts it.
     #[inline]
-    fn motion(&self) -> (i64, i64) {
-        let acceleration = self.acceleration + 22 * self.jerk;
-        (self.speed + 157 * self.jerk - (acceleration >> 1), acceleration)
+    fn motion(&self) -> Motion {
+        let jerk = self.jerk >> 5;
+        let acceleration = self.acceleration + 22 * jerk;
+        Motion { speed: self.speed + i64::from(157 * jerk - (acceleration >> 1)), acceleration, jerk }
+    }
+}
+
+/// A motion in units of the state.
+#[derive(Clone, Copy)]
+struct Motion {
+    speed: i64,
+    acceleration: i32,
+    jerk: i32,
+}
+
+impl Motion {
+    /// Speed, ticks², saturated.
+    #[inline]
+    fn ticks(speed: i64) -> i32 {
+        (speed >> STATE_BITS).clamp(-LARGEST, LARGEST) as i32
+    }
+
+    /// Acceleration, 1/16 tick, saturated at twice the longest rise.
+    #[inline]
+    fn rise(acceleration: i32) -> i32 {
+        const BEYOND: i32 = LONGEST_RISE << (RISE_BITS + 1);
+        (acceleration >> RISE_SHIFT).clamp(-BEYOND, BEYOND)
     }
 }
 
 /// State of the shaper.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shaper {
+    /// Value, 2⁻⁴⁰.
     value: i64,
+    /// The jerk whose units the state has; 0 before the first tick.
+    jerk: i32,
+    state: i64,
     speed: i64,
-    acceleration: i64,
+    acceleration: i32,
     goal: Goal,
     locked: bool,
 }
@@ -251,7 +289,7 @@ impl Shaper {
     /// Stands at `value`, 2⁻⁴⁰.
     #[must_use]
     pub fn standing_at(value: i64) -> Self {
-        Self { value, goal: Goal::at(value), locked: true, ..Self::default() }
+        Self { value, ..Self::default() }
     }
 
     /// Value, 2⁻⁴⁰.
@@ -264,73 +302,98 @@ impl Shaper {
     /// Acceleration, 2⁻⁴⁰ per tick².
     #[inline]
     #[must_use]
-    pub const fn acceleration(&self) -> i64 {
-        self.acceleration
+    pub fn acceleration(&self) -> i64 {
+        (i64::from(self.acceleration) * i64::from(self.jerk)) >> STATE_BITS
     }
 
-    /// Follows another goal from now on, which begins at `value` and at rest.
-    pub fn restart(&mut self, value: i64) {
-        self.goal = Goal::at(value);
+    /// Follows another goal from now on, which begins at the present value and at rest.
+    pub fn restart(&mut self) {
+        self.goal = Goal::at(self.state);
         self.locked = false;
+    }
+
+    /// Other limits have another jerk: the state is counted in units of the new one.
+    #[cold]
+    fn count_in(&mut self, limits: &ShaperLimits) {
+        let before = ShaperLimits { jerk: self.jerk, ..ShaperLimits::default() };
+        let again = |state: i64| limits.state_of(before.value_of(state));
+        self.state = limits.state_of(self.value);
+        self.speed = again(self.speed).clamp(-LARGEST << STATE_BITS, LARGEST << STATE_BITS);
+        let longest = i64::from(LONGEST_RISE) << STATE_BITS;
+        self.acceleration = again(self.acceleration.into()).clamp(-longest, longest) as i32;
+        self.jerk = limits.jerk;
+        self.restart();
     }
 
     /// One tick towards `goal`. Inside `range` the value never leaves it: it stops before either end.
     pub fn step(&mut self, limits: &ShaperLimits, range: [i64; 2], goal: i64) -> Limited {
-        self.goal.follow(goal, i64::from(limits.jerk));
+        if self.jerk != limits.jerk {
+            self.count_in(limits);
+        }
+        let target = limits.state_of(goal);
+        let steady = self.goal.follow(target);
         let inward = i32::from(limits.rise);
         let outward = limits.outward(self.value);
         let bounds = Bounds {
+            limits,
             range,
             most: if self.value < 0 { [outward, inward] } else { [inward, outward] },
-            speed: i64::from(limits.speed) << 8,
+            speed: limits.speed,
         };
-        let seen = Seen::new(limits, &self.goal);
-        self.locked = self.meets(limits, &seen, goal) && bounds.allow_lock(limits, &seen, goal);
+        let seen = self.goal.motion();
+        self.locked = self.meets(&seen, target, steady) && bounds.allow(&seen, target);
         if self.locked {
-            (self.value, self.speed, self.acceleration) = (goal, seen.speed, seen.acceleration);
+            (self.value, self.state) = (goal, target);
+            (self.speed, self.acceleration) = (seen.speed, seen.acceleration);
             return Limited::default();
         }
-        self.catch_up(limits, &bounds, &seen, goal)
+        let limited = self.catch_up(&bounds, &seen, target);
+        self.value = limits.value_of(self.state);
+        limited
     }
 
     /// Whether the goal is where this tick leads without jerk, within a few steps of the jerk. Once locked, the value is the
-    /// goal; its speed and acceleration, as the filter knows them, must go on as steadily.
+    /// goal, which must go on steadily.
     #[inline]
-    fn meets(&self, limits: &ShaperLimits, seen: &Seen, goal: i64) -> bool {
-        let near = |difference: i64, steps: i64| difference.abs() <= steps * i64::from(limits.jerk);
-        let speed = self.speed + self.acceleration;
-        let (value_steps, speed_steps) = if self.locked { (LOCKED_STEPS, LOCKED_STEPS) } else { (32, 12) };
-        near(seen.jerk, 1)
-            && near(self.acceleration - seen.acceleration, 4)
-            && near(speed - seen.speed, speed_steps)
-            && near(self.value + speed - goal, value_steps)
+    fn meets(&self, seen: &Motion, target: i64, steady: bool) -> bool {
+        let near = |difference: i64, steps: i64| difference.abs() <= steps << STATE_BITS;
+        let speed = self.speed + i64::from(self.acceleration);
+        seen.jerk.abs() <= 1 << STATE_BITS
+            && (self.acceleration - seen.acceleration).abs() <= 4 << STATE_BITS
+            && if self.locked {
+                steady
+            } else {
+                near(speed - seen.speed, 12) && near(self.state + speed - target, 32)
+            }
     }
 
     /// A tick that is not locked.
-    fn catch_up(&mut self, limits: &ShaperLimits, bounds: &Bounds, seen: &Seen, goal: i64) -> Limited {
-        let jerk = i64::from(limits.jerk);
-        let speed = self.speed + self.acceleration;
-        let ahead = self.value + speed - goal;
+    fn catch_up(&mut self, bounds: &Bounds, seen: &Motion, target: i64) -> Limited {
+        const ONE: i32 = 1 << STATE_BITS;
+        let speed = self.speed + i64::from(self.acceleration);
+        let ahead = self.state + speed - target;
         // Mirrored, so that the goal is towards +.
         let towards = if ahead > 0 { -1 } else { 1 };
         let [below, above] = bounds.most;
         let (fall, rise) = if ahead > 0 { (above, below) } else { (below, above) };
+        let own_rise = towards * Motion::rise(self.acceleration);
+        let goal_rise = towards * Motion::rise(seen.acceleration);
         let relative = Approach {
-            speed: towards * limits.ticks_of(speed - seen.speed),
-            rise: towards * (limits.rise_of(self.acceleration) - seen.rise),
-            distance: limits.over_jerk(ahead.abs()),
+            speed: towards * Motion::ticks(speed - seen.speed),
+            rise: own_rise - goal_rise,
+            distance: ahead.abs() >> STATE_BITS,
         };
         // A goal with a jerk of its own leaves a part of the jerk for braking, counted as 1, 1/2, 1/4 or 1/8.
-        let part = |of: i64| u32::from(seen.jerk.abs() > of);
-        let halvings = part(jerk >> 3) + part(jerk >> 1) + part(jerk - (jerk >> 2));
+        let part = |of: i32| u32::from(seen.jerk.abs() > of);
+        let halvings = part(ONE / 8) + part(ONE / 2) + part(ONE * 3 / 4);
         // Its acceleration takes or leaves some of the deceleration.
-        let fall = (fall + towards * seen.rise).max(fall >> 2).min(fall + (fall >> 1));
+        let fall = (fall + goal_rise).max(fall >> 2).min(fall + (fall >> 1));
         let fall = (fall << halvings).min(LONGEST_RISE << RISE_BITS);
-        let own_rise = towards * limits.rise_of(self.acceleration);
         let may = |steps: i32| {
+            const BEYOND: i32 = LONGEST_RISE << (RISE_BITS + 1);
             let after = Approach {
                 speed: (relative.speed + steps) << halvings,
-                rise: (relative.rise + (steps << RISE_BITS)) << halvings,
+                rise: ((relative.rise + (steps << RISE_BITS)) << halvings).clamp(-BEYOND, BEYOND),
                 distance: (relative.distance - i64::from(steps)) << halvings,
             };
             own_rise + (steps << RISE_BITS) <= rise && after.stops(fall, false)
@@ -342,102 +405,97 @@ impl Shaper {
         } else {
             -1
         };
-        let wanted = self.acceleration + i64::from(towards * steps) * jerk;
-        let slowed = self.slowed(limits, bounds, wanted);
-        let mut acceleration = self.bounded(jerk, bounds, slowed);
-        let speed = self.speed + acceleration;
-        let motion =
-            Approach { speed: limits.ticks_of(speed), rise: limits.rise_of(acceleration), distance: 0 };
-        let [low, high] = bounds.hold(limits, motion, self.value + speed, false);
+        let wanted = self.acceleration + towards * steps * ONE;
+        let slowed = self.slowed(bounds, wanted);
+        let mut acceleration = self.bounded(bounds, slowed);
+        let speed = self.speed + i64::from(acceleration);
+        let [low, high] = bounds.hold(speed, acceleration, self.state + speed, false);
         if !(low && high) {
-            let brake = if high || (!low && speed < 0) { jerk } else { -jerk };
-            acceleration = self.bounded(jerk, bounds, self.acceleration + brake);
+            let brake = if high || (!low && speed < 0) { ONE } else { -ONE };
+            acceleration = self.bounded(bounds, self.acceleration + brake);
         }
         self.acceleration = acceleration;
-        self.speed += acceleration;
-        self.value += self.speed;
+        self.speed += i64::from(acceleration);
+        self.state += self.speed;
         Limited { acceleration: true, speed: slowed != wanted }
     }
 
     /// `wanted`, or less where the speed would be beyond its limit by the time the acceleration is zero.
     #[inline]
-    fn slowed(&self, limits: &ShaperLimits, bounds: &Bounds, wanted: i64) -> i64 {
-        let jerk = i64::from(limits.jerk);
+    fn slowed(&self, bounds: &Bounds, wanted: i32) -> i32 {
         let sign = if wanted < 0 { -1 } else { 1 };
-        let too_fast = |acceleration: i64| bounds.too_fast(limits, self.speed + acceleration, acceleration);
+        let too_fast =
+            |acceleration: i32| bounds.too_fast(self.speed + i64::from(acceleration), acceleration);
         if !too_fast(wanted) {
             return wanted;
         }
         let held = (sign * self.acceleration).min(sign * wanted).max(0);
-        let less = (sign * self.acceleration - jerk).max(0);
+        let less = (sign * self.acceleration - (1 << STATE_BITS)).max(0);
         sign * if too_fast(sign * held) { held.min(less) } else { held }
     }
 
     /// `wanted` within the limits of the acceleration, and no further from the present one than the jerk allows.
     #[inline]
-    fn bounded(&self, jerk: i64, bounds: &Bounds, wanted: i64) -> i64 {
-        let [below, above] = bounds.most.map(|most| (i64::from(most) * jerk) >> RISE_BITS);
-        let least = (-below).min(self.acceleration + jerk);
-        let most = above.max(self.acceleration - jerk);
+    fn bounded(&self, bounds: &Bounds, wanted: i32) -> i32 {
+        let [below, above] = bounds.most.map(|most| most << RISE_SHIFT);
+        let least = (-below).min(self.acceleration + (1 << STATE_BITS));
+        let most = above.max(self.acceleration - (1 << STATE_BITS));
         wanted.max(least).min(most)
     }
 }
 
-/// Motion of the goal, as far as the filter knows it.
-struct Seen {
-    speed: i64,
-    acceleration: i64,
-    jerk: i64,
-    /// Acceleration over the largest jerk, 1/16 tick.
-    rise: i32,
-}
-
-impl Seen {
-    #[inline]
-    fn new(limits: &ShaperLimits, goal: &Goal) -> Self {
-        let (speed, acceleration) = goal.motion();
-        Self { speed, acceleration, jerk: goal.jerk, rise: limits.rise_of(acceleration) }
-    }
-}
-
 /// Limits at the present value.
-struct Bounds {
+struct Bounds<'l> {
+    limits: &'l ShaperLimits,
+    /// 2⁻⁴⁰
     range: [i64; 2],
     /// Largest acceleration towards − and towards +, 1/16 tick.
     most: [i32; 2],
-    /// 2⁻⁴⁰ per tick
-    speed: i64,
+    /// ticks²
+    speed: i32,
 }
 
-impl Bounds {
+impl Bounds<'_> {
     /// Whether the goal itself is within the limits.
     #[inline]
-    fn allow_lock(&self, limits: &ShaperLimits, seen: &Seen, goal: i64) -> bool {
+    fn allow(&self, seen: &Motion, target: i64) -> bool {
         let [below, above] = self.most;
-        let motion = Approach { speed: limits.ticks_of(seen.speed), rise: seen.rise, distance: 0 };
-        let [low, high] = self.hold(limits, motion, goal, true);
-        let too_fast = seen.speed.abs() > self.speed || self.too_fast(limits, seen.speed, seen.acceleration);
-        -below <= seen.rise && seen.rise <= above && !too_fast && low && high
+        let rise = Motion::rise(seen.acceleration);
+        -below <= rise
+            && rise <= above
+            && Motion::ticks(seen.speed).abs() <= self.speed
+            && !self.too_fast(seen.speed, seen.acceleration)
+            && self.hold(seen.speed, seen.acceleration, target, true) == [true; 2]
     }
 
     /// Whether the speed will be beyond its limit by the time the acceleration is zero.
     #[inline]
-    fn too_fast(&self, limits: &ShaperLimits, speed: i64, acceleration: i64) -> bool {
-        let rise = i64::from(limits.rise_of(acceleration));
-        let gain = ((rise * rise) >> (2 * RISE_BITS + 1)) * i64::from(limits.jerk);
-        let end = if acceleration < 0 { speed - gain } else { speed + gain };
+    fn too_fast(&self, speed: i64, acceleration: i32) -> bool {
+        let gain = Approach::gain(Motion::rise(acceleration));
+        let (speed, gain) = (Motion::ticks(speed), if acceleration < 0 { -gain } else { gain });
+        let end = speed + gain;
         end.abs() > self.speed && (end < 0) == (acceleration < 0)
     }
 
     /// Whether a motion at `value` stops before the lower and before the upper end of the range.
     #[inline]
-    fn hold(&self, limits: &ShaperLimits, motion: Approach, value: i64, lenient: bool) -> [bool; 2] {
+    fn hold(&self, speed: i64, acceleration: i32, value: i64, lenient: bool) -> [bool; 2] {
         let [low, high] = self.range;
+        // Braked by the acceleration towards the other end.
         let [below, above] = self.most;
-        let down =
-            Approach { speed: -motion.speed, rise: -motion.rise, distance: limits.over_jerk(value - low) };
-        let up = Approach { distance: limits.over_jerk(high - value), ..motion };
-        [down.stops(above, lenient), up.stops(below, lenient)]
+        let (speed, rise) = (Motion::ticks(speed), Motion::rise(acceleration));
+        let gain = Approach::gain(rise);
+        let end = if rise < 0 { speed - gain } else { speed + gain };
+        let distance = |from: i64, to: i64| (to - from) >> STATE_BITS;
+        let down = (speed >= 0 && end >= 0) || {
+            let distance = distance(self.limits.state_of(low), value);
+            Approach { speed: -speed, rise: -rise, distance }.stops(above, lenient)
+        };
+        let up = (speed <= 0 && end <= 0) || {
+            let distance = distance(value, self.limits.state_of(high));
+            Approach { speed, rise, distance }.stops(below, lenient)
+        };
+        [down, up]
     }
 }
 
