@@ -171,3 +171,75 @@ impl Motor {
         (self.torque - taken).max(0.1 * self.torque) / self.inertia
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+
+    /// Tensions f1 to f4 of cables in full slip that the motor pulls, by their mean along the sheath in 10 000 pieces.
+    fn tensions_n(parameters: &Parameters, torque_nm: f64) -> [f64; 4] {
+        let exponent =
+            f64::from(parameters.sheath.friction_coefficient) * f64::from(parameters.sheath.wrap_angle);
+        let pretension_n = f64::from(parameters.tendon.pretension);
+        let difference_n = torque_nm / f64::from(parameters.pulley.output_radius);
+        let mean = |output_n: f64, sign: f64| {
+            let pieces = (0..10_000).map(|n| (f64::from(n) + 0.5) * 1e-4);
+            pieces.map(|part| output_n * (sign * exponent * part).exp()).sum::<f64>() * 1e-4
+        };
+        // F4 for which both cables together are as long as at rest.
+        let (mut low, mut high) = (-1000.0, 1000.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            let sum = mean(middle + difference_n, 1.0) + mean(middle, -1.0);
+            *(if sum < 2.0 * pretension_n { &mut low } else { &mut high }) = middle;
+        }
+        let f2 = low + difference_n;
+        [f2 * exponent.exp(), f2, low * (-exponent).exp(), low]
+    }
+
+    #[test]
+    fn the_torque_leaves_the_lowest_and_the_highest_tension_where_they_may_be() {
+        let mut parameters = Parameters::default();
+        parameters.limits.torque = 100.0;
+        parameters.limits.current = 13.0;
+        for (friction, pretension_n, over_n, end) in
+            [(0.12, 30.0, 90.0, 2), (0.0, 30.0, 90.0, 2), (0.3, 60.0, 300.0, 2), (0.12, 50.0, 90.0, 0)]
+        {
+            parameters.sheath.friction_coefficient = friction;
+            parameters.tendon.pretension = pretension_n;
+            parameters.tension.over = over_n;
+            let torque_nm = f64::from(Reach::new(&parameters).torque);
+            let margin_n = f64::from(TENSION_MARGIN * pretension_n);
+            let tensions = tensions_n(&parameters, torque_nm);
+            let expected_n = if end == 0 { f64::from(over_n) - margin_n } else { 1.0 + margin_n };
+            assert!(
+                (tensions[end] - expected_n).abs() < 2e-3,
+                "mu {friction}: {torque_nm} N·m, {tensions:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_weak_motor_limits_torque_and_acceleration() {
+        let mut parameters = Parameters::default();
+        let strong = Reach::new(&parameters);
+        // 0.9 of 0.6 A at 0.9 N·m/A are 0.486 N·m, of which friction takes 2·30 N·0.377·0.015 m = 0.339 N·m.
+        parameters.limits.current = 0.6;
+        let weak = Reach::new(&parameters);
+        assert!((weak.torque - 0.147).abs() < 1e-3, "{}", weak.torque);
+        // A tenth of 0.486 N·m over 0.0045 kg·m².
+        assert!((weak.acceleration - 10.8).abs() < 0.1, "{}", weak.acceleration);
+        assert!(strong.acceleration > 4.0 * weak.acceleration && strong.angle[1] > weak.angle[1]);
+    }
+
+    #[test]
+    fn without_a_load_the_bounds_of_the_user_count() {
+        let mut parameters = Parameters::default();
+        parameters.load.mass = 0.0;
+        let reach = Reach::new(&parameters);
+        assert_eq!(reach.angle, [-1.2, 1.2]);
+        assert_eq!((reach.acceleration, reach.gravity, reach.jerk), (300.0, 0.0, 20_000.0));
+    }
+}

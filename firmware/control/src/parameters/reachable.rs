@@ -141,3 +141,54 @@ fn shortest_move(distance: f32, speed: f32, acceleration: f32, jerk: f32) -> f32
     let cruise = (distance / reached - 2.0 * rise - hold).max(0.0);
     4.0 * rise + 2.0 * hold + cruise
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+
+    fn sine(amplitude: f32, offset: f32, frequency_hz: f32) -> Reference {
+        Reference::Generated { shape: Shape::Sine, amplitude, offset, frequency_hz }
+    }
+
+    #[test]
+    fn the_shortest_move_by_hand() {
+        // Never at a limit: 4 (d/2j)^(1/3). At full acceleration a: the rest of 2 √(d/a) + a/j for long times. At full speed:
+        // d/v + v/a + a/j.
+        for (distance, speed, acceleration, jerk, expected_s) in [
+            (2e-3, 100.0, 100.0, 1000.0, 0.04),
+            (1.0, 100.0, 100.0, 1e6, 0.2 + 1e-4),
+            (10.0, 2.0, 10.0, 1000.0, 5.0 + 0.2 + 0.01),
+            (0.0, 2.0, 100.0, 1000.0, 0.0),
+        ] {
+            let time_s = shortest_move(distance, speed, acceleration, jerk);
+            assert!((time_s - expected_s).abs() <= 2e-3 * expected_s, "{distance}: {time_s}");
+        }
+        assert_eq!(shortest_move(1.0, 1.0, 0.0, 1.0), f32::MAX);
+    }
+
+    #[test]
+    fn what_is_refused_says_which_number_and_what_can_be_done() {
+        let parameters = Parameters::default();
+        for (reference, quantity) in [
+            (sine(0.3, 0.0, 101.0), Quantity::Frequency),
+            (sine(0.3, 1.0, 0.5), Quantity::Offset),
+            (sine(-0.5, 0.6, 0.5), Quantity::Amplitude),
+            (sine(0.3, 0.0, 5.0), Quantity::Amplitude),
+            (Reference::Hold(f32::NAN), Quantity::Value),
+        ] {
+            let no = check_reference(&parameters, Mode::Position, reference).unwrap_err();
+            assert_eq!(no.quantity, quantity, "{reference:?}");
+            assert!(no.minimum < no.maximum && !(no.got >= no.minimum && no.got <= no.maximum));
+        }
+        // What is left beside the offset.
+        let no = check_reference(&parameters, Mode::Position, sine(0.5, 0.6, 0.1)).unwrap_err();
+        assert!((no.maximum - (Reach::new(&parameters).angle[1] - 0.6)).abs() < 1e-6, "{no:?}");
+        assert_eq!(check_reference(&parameters, Mode::Position, sine(no.maximum, 0.6, 0.1)), Ok(()));
+        // Less and less with the frequency, and never nothing.
+        let largest =
+            |hz| check_reference(&parameters, Mode::Position, sine(9.0, 0.0, hz)).unwrap_err().maximum;
+        assert!(largest(1.0) > largest(2.0) && largest(2.0) > largest(20.0) && largest(100.0) > 0.0);
+    }
+}
