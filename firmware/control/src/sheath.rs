@@ -90,13 +90,13 @@ pub struct SheathConfig {
     pub torque_filter: Weight<Torque, Torque>,
     /// Part of a count of the joint's encoder, at the input pulley, within which an innovation says nothing.
     pub silent: Angle,
-    /// Growth of the variance a tick.
+    /// Growth of the variance in two ticks.
     pub process: Weight<Ratio, Ratio>,
-    /// Growth of the variance a tick, per square of the mean innovation.
+    /// Growth of the variance in two ticks, per square of the mean innovation.
     pub moved: Weight<Ratio, Ratio>,
     /// Mean over innovations.
     pub innovation_filter: Weight<Ratio, Ratio>,
-    /// One over the variance of a tick's measurement.
+    /// One over the variance of what two ticks measure.
     pub per_noise: Gain<Ratio, Ratio>,
     /// Variance from which on nothing is known.
     pub known_below: Ratio,
@@ -218,6 +218,8 @@ struct Slip {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SheathObserver {
     started: bool,
+    /// It is the turn of the second cable.
+    second: bool,
     cables: [Follower; 2],
     zone: Zone,
     torque_in: Sum<Torque>,
@@ -241,10 +243,15 @@ impl SheathObserver {
         let [a, b] = self.cables.map(|cable| cable.ratio.value());
         let half_width = config.zone.apply(a.half_sum(b)).plus(config.play);
         let slip = self.zone.step(input.motion.angle, half_width);
+        // One cable a tick: half of the work, and a cable changes little in two ticks.
+        self.second = !self.second;
         if config.adapts {
             match config.fitted {
                 Fitted::All => self.learn_from_tensions(config, input.tensions, slip),
-                Fitted::Nothing | Fitted::Input => self.learn_from_stretch(config, input, torque_in, slip),
+                Fitted::Nothing | Fitted::Input if self.second => {
+                    self.learn_from_stretch(config, input, torque_in, slip);
+                }
+                Fitted::Nothing | Fitted::Input => {}
             }
         }
         self.estimate(config, input, torque_in, slip.slips)
@@ -254,6 +261,7 @@ impl SheathObserver {
         let angle = input.motion.angle;
         *self = Self {
             started: true,
+            second: false,
             cables: [Follower::at(config.nominal); 2],
             zone: Zone { middle: angle, last: angle },
             torque_in: Sum::at(torque_in),
@@ -264,17 +272,17 @@ impl SheathObserver {
     fn learn_from_tensions(&mut self, config: &SheathConfig, tensions: [Tension; 4], slip: Slip) {
         let [f1, f2, f3, f4] = tensions;
         // Towards +theta cable a is hauled, f1 above f2, and cable b pays out, f4 above f3.
-        for (cable, (more, less)) in self.cables.iter_mut().zip([(f1, f2), (f4, f3)]) {
-            cable.age(config);
-            let difference = more.minus(less);
-            let friction = cable.ratio.value().of(more.plus(less));
-            let excess = difference.magnitude().minus(friction);
-            if excess > Tension::ZERO {
-                cable.learn(config, config.per_tension.apply(excess));
-            } else if slip.slips {
-                let along = if slip.backward { difference.negated() } else { difference };
-                cable.learn(config, config.per_tension.apply(along.minus(friction)));
-            }
+        let [a, b] = &mut self.cables;
+        let (cable, more, less) = if self.second { (b, f4, f3) } else { (a, f1, f2) };
+        cable.age(config);
+        let difference = more.minus(less);
+        let friction = cable.ratio.value().of(more.plus(less));
+        let excess = difference.magnitude().minus(friction);
+        if excess > Tension::ZERO {
+            cable.learn(config, config.per_tension.apply(excess));
+        } else if slip.slips {
+            let along = if slip.backward { difference.negated() } else { difference };
+            cable.learn(config, config.per_tension.apply(along.minus(friction)));
         }
     }
 

@@ -395,6 +395,8 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
     let play_rad = backlash.enable * (backlash.transmission_gap + ratio * backlash.joint_gap);
     let filter_s = if fitted == Fitted::Nothing { CURRENT_FILTER_S } else { TENSION_FILTER_S };
     let rate = 0.5 * parameters.sheath.exponent_rate;
+    // Each cable has every second tick.
+    let turn_s = 2.0 * period_s;
     Ok(SheathConfig {
         fitted,
         adapts: parameters.sheath.adapts == 1.0,
@@ -412,10 +414,10 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
         viscous: gain(parameters.motor.viscous, "motor.viscous")?,
         torque_filter: Weight::low_pass(filter_s, period_s),
         silent: Angle::from_f32(0.5 * SILENT_PART * RAD_PER_COUNT * ratio),
-        process: Weight::new(rate * rate * period_s),
-        moved: Weight::new(MOVED_PER_S * TENSION_VARIANCE / variance * period_s),
-        innovation_filter: Weight::low_pass(INNOVATION_TIME_S, period_s),
-        per_noise: gain(1.0 / variance, "tendon.axial_stiffness")?,
+        process: Weight::new(rate * rate * turn_s),
+        moved: Weight::new(MOVED_PER_S * TENSION_VARIANCE / variance * turn_s),
+        innovation_filter: Weight::low_pass(INNOVATION_TIME_S, turn_s),
+        per_noise: gain(2.0 / variance, "tendon.axial_stiffness")?,
         known_below: Ratio::from_f32(KNOWN * KNOWN),
     })
 }

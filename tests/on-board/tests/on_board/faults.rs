@@ -121,8 +121,8 @@ fn slack_and_overload_are_found() -> Outcome {
 
 #[test]
 fn tensions_that_do_not_fit_the_friction_are_found() -> Outcome {
-    // 50 ms, and the low-pass of 5 ms: 5 N against 30 N.
-    injected(Injection::TensionOffset(TensionAt::F1, -25.0), Fault::TensionInconsistent, 0, 0.08).map(|_| ())
+    // 50 ms, and the low-pass of 5 ms: a sixth of what the other end has.
+    injected(Injection::TensionGain(TensionAt::F1, 0.17), Fault::TensionInconsistent, 0, 0.08).map(|_| ())
 }
 
 #[test]
