@@ -227,7 +227,7 @@ pub struct SheathObserver {
 }
 
 impl SheathObserver {
-    /// One tick; 333 instructions of a Cortex-M4 at most (`cargo xtask bench --board`).
+    /// One tick; kept out of line so that its instructions can be counted.
     #[inline(never)]
     pub fn observe(&mut self, config: &SheathConfig, input: &SheathInput) -> SheathEstimate {
         let measured_in = match config.fitted {
