@@ -10,7 +10,8 @@ use bowden_link::ToBoard;
 use tempfile::TempDir;
 
 use crate::bowden;
-use crate::fake::{Fake, Mishaps};
+use crate::fake::Fake;
+use crate::mishaps::Mishaps;
 use crate::wires::connect;
 
 /// The bench as both boards have it by default, but for the resistance and what `more` says of effects.
