@@ -531,4 +531,43 @@ mod tests {
         assert_eq!(estimate.ratio, [config.nominal; 2]);
         assert!(estimate.known);
     }
+
+    #[test]
+    fn more_than_the_present_friction_is_learned_from_cables_that_stand() {
+        // Half of the friction at the start, ends of the cables as after slip towards +theta, and nothing moves.
+        let mut config = config(2.0);
+        config.nominal = Ratio::from_f32((0.12 * PI / 4.0).tanh() as f32);
+        let moment = Joint::PAPER.slipping([0.12 * PI; 2], 1.0, 0.15);
+        let input = SheathInput {
+            tensions: moment.tensions_n.map(|tension_n| Tension::from_f32(tension_n as f32)),
+            ..SheathInput::default()
+        };
+        let mut observer = SheathObserver::default();
+        for _ in 0..2000 {
+            observer.observe(&config, &input);
+        }
+        for ratio in observer.observe(&config, &input).ratio {
+            assert!((exponent(ratio) / (0.12 * PI) - 1.0).abs() < 0.01, "{}", exponent(ratio));
+        }
+    }
+
+    #[test]
+    fn a_load_that_comes_back_is_not_taken_for_less_friction() {
+        // The pulley turns for 600 ticks and stands; from tick 595 on the joint comes back, and the ends of the cables differ
+        // by less and less, by nothing at tick 795.
+        let config = config(2.0);
+        let mut observer = SheathObserver::default();
+        let mut estimate = SheathEstimate::default();
+        for tick in 0..795 {
+            let share = 1.0 - f64::from((tick - 595).max(0)) / 200.0;
+            let moment = Joint::PAPER.slipping([0.12 * PI; 2], share, 0.15);
+            let motion =
+                Motion { angle: Angle::from_f32(5e-5 * tick.min(600) as f32), speed: Speed::from_f32(0.5) };
+            let tensions = moment.tensions_n.map(|tension_n| Tension::from_f32(tension_n as f32));
+            estimate = observer.observe(&config, &SheathInput { tensions, motion, ..SheathInput::default() });
+        }
+        for ratio in estimate.ratio {
+            assert!(exponent(ratio) > 0.95 * 0.12 * PI, "{}", exponent(ratio));
+        }
+    }
 }

@@ -124,15 +124,6 @@ pub struct Removal {
     pub runs: usize,
 }
 
-impl Removal {
-    /// Whether median and worst seed are what is wanted.
-    #[must_use]
-    pub fn reaches_goal(&self) -> bool {
-        let [median, worst] = self.sensors.goal_percent;
-        self.removed_percent.median >= median && self.removed_percent.least >= worst
-    }
-}
-
 /// Error without compensation for each seed \[%\].
 ///
 /// # Errors
