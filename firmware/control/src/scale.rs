@@ -223,11 +223,14 @@ pub(crate) const fn saturated(wide: i64) -> i32 {
 
 /// Factor from a quantity to another: `O = factor · I`.
 ///
-/// `bits(O) = ((bits(I) · mantissa >> shift) + 1) >> 1`, in 64 bits. The mantissa has 24 bits, so it is the `f32` itself.
+/// `bits(O) = ((bits(I) · 2^up · mantissa >> (32 + down)) + 1) >> 1`, in 64 bits: the upper half of the product holds the result,
+/// unless `bits(I) · 2^up` leaves 32 bits, which takes results of 2²⁸ steps and more and another way. The mantissa has 24 bits
+/// and seven zeros, so it is the `f32` itself.
 #[derive(Debug)]
 pub struct Gain<I, O> {
     mantissa: i32,
-    shift: u8,
+    /// `up` in the lowest byte, `down` in the next: both are taken out and bounded by one instruction each.
+    shifts: u32,
     from_to: PhantomData<fn(I) -> O>,
 }
 
@@ -241,7 +244,7 @@ impl<I, O> Copy for Gain<I, O> {}
 
 impl<I, O> PartialEq for Gain<I, O> {
     fn eq(&self, other: &Self) -> bool {
-        (self.mantissa, self.shift) == (other.mantissa, other.shift)
+        (self.mantissa, self.shifts) == (other.mantissa, other.shifts)
     }
 }
 
@@ -253,6 +256,8 @@ impl<I: Quantity, O: Quantity> Gain<I, O> {
         /// Bits of an `f32` mantissa behind its leading one, and the bias of its exponent.
         const MANTISSA_BITS: i32 = 23;
         const BIAS: i32 = 127;
+        /// Zeros below the mantissa.
+        const SPARE_BITS: i32 = 7;
         if !factor.is_finite() {
             return None;
         }
@@ -260,28 +265,47 @@ impl<I: Quantity, O: Quantity> Gain<I, O> {
         let exponent = (bits >> MANTISSA_BITS & 0xff).cast_signed();
         let magnitude = if exponent == 0 { 0 } else { (bits & 0x7f_ffff | 0x80_0000).cast_signed() };
         let mantissa = if factor < 0.0 { -magnitude } else { magnitude };
-        // One bit is left for the rounding.
-        let shift = BIAS + MANTISSA_BITS - 1 - exponent + I::FRACTION_BITS.cast_signed()
+        // Places behind the point of a product with the 24 bits alone, less the one of the rounding.
+        let places = BIAS + MANTISSA_BITS - 1 - exponent + I::FRACTION_BITS.cast_signed()
             - O::FRACTION_BITS.cast_signed();
-        match shift {
+        let beyond = places + SPARE_BITS - 32;
+        match places {
             _ if mantissa == 0 => Some(Self::ZERO),
-            0..=62 => Some(Self { mantissa, shift: shift as u8, from_to: PhantomData }),
-            -7..=-1 => Some(Self { mantissa: mantissa << -shift, shift: 0, from_to: PhantomData }),
+            -6..=62 => {
+                // By 31 places down nothing is left of any product.
+                let (up, down) = ((-beyond).max(0), beyond.clamp(0, 31));
+                let shifts = (up | down << 8).cast_unsigned();
+                Some(Self { mantissa: mantissa << SPARE_BITS, shifts, from_to: PhantomData })
+            }
             63.. => Some(Self::ZERO),
             _ => None,
         }
     }
 
     /// The gain nothing.
-    pub const ZERO: Self = Self { mantissa: 0, shift: 0, from_to: PhantomData };
+    pub const ZERO: Self = Self { mantissa: 0, shifts: 0, from_to: PhantomData };
 
     /// `factor · value`, rounded to nearest, saturated.
     #[inline]
     #[must_use]
     pub fn apply(self, value: I) -> O {
-        let product = i64::from(value.to_bits()) * i64::from(self.mantissa);
-        O::from_bits(saturated(((product >> self.shift) + 1) >> 1))
+        let (up, down) = (self.shifts & 31, self.shifts >> 8 & 31);
+        let value = value.to_bits();
+        let raised = value << up;
+        if raised >> up != value {
+            return O::from_bits(large(value, self.mantissa, up));
+        }
+        let upper = ((i64::from(raised) * i64::from(self.mantissa)) >> 32) as i32;
+        O::from_bits(((upper >> down) + 1) >> 1)
     }
+}
+
+/// `value · mantissa · 2^up`, of which 33 places go, rounded and saturated; for values that leave 32 bits when they are raised.
+#[cold]
+#[inline(never)]
+fn large(value: i32, mantissa: i32, up: u32) -> i32 {
+    let product = i64::from(value) * i64::from(mantissa);
+    saturated(((product >> (32 - up)) + 1) >> 1)
 }
 
 /// Ticks in a row in which something was wrong.
@@ -292,8 +316,12 @@ impl Debounce {
     /// Counts this tick; whether it has been wrong for `ticks` in a row now.
     #[inline]
     pub const fn count(&mut self, wrong: bool, ticks: u16) -> bool {
-        self.0 = if wrong { self.0.saturating_add(1) } else { 0 };
-        wrong && self.0 >= ticks
+        if !wrong {
+            self.0 = 0;
+            return false;
+        }
+        self.0 = self.0.saturating_add(1);
+        self.0 >= ticks
     }
 }
 
@@ -382,8 +410,10 @@ impl<O: Quantity> Sum<O> {
     /// Low-pass step towards `input`; returns the new value.
     #[inline]
     pub fn approach(&mut self, weight: Weight<O, O>, input: O) -> O {
+        debug_assert!(weight.bits >= 0, "a low-pass goes towards its input");
         let difference = input.to_bits().saturating_sub(self.value().to_bits());
-        self.add(weight, O::from_bits(difference));
+        // Between the old value and the input, and so in range: nothing to saturate.
+        self.wide += i64::from(weight.bits) * i64::from(difference);
         self.value()
     }
 }
