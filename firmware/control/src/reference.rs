@@ -17,7 +17,7 @@ use bowden_link::{Limit, Limits};
 
 use crate::scale::{Acceleration, Angle, Gain, Quantity, Speed, Torque, saturated};
 use crate::tick::Inbox;
-use shaper::{Shaper, ShaperLimits};
+use shaper::{Ends, Shaper, ShaperLimits};
 
 pub use crate::parameters::{ReferenceConfig, reference_config};
 
@@ -87,6 +87,9 @@ pub struct ReferenceState {
     extremes: [i64; 2],
     /// Value from which the present reference took over, 2⁻⁴⁰.
     from: i64,
+    /// Ends of the shaper's range, and range and jerk of the bounds that they were made for.
+    ends: Ends,
+    ends_for: Option<([i32; 2], i32)>,
     /// Part of the ramp that is done, 2³² the whole; stays at its end.
     ramp: u32,
     phase: u32,
@@ -163,7 +166,7 @@ impl ReferenceState {
             }
         };
         *self =
-            Self { config, shaper, extremes: [low, high], from, ramp: 0, phase: 0, points, starved: true };
+            Self { config, shaper, extremes: [low, high], from, points, starved: true, ..Self::default() };
     }
 
     /// One tick. The goal is clamped to `window`, which is within the range of `bounds`.
@@ -185,17 +188,17 @@ impl ReferenceState {
             }
         };
         let goal = self.blended(goal);
-        let [least, most] = window.map(|bound| i64::from(bound) << EXTRA_BITS);
+        let [least, most] = window;
+        let (least, most) = (i64::from(least) << EXTRA_BITS, i64::from(most) << EXTRA_BITS);
         let clamped = goal.max(least).min(most);
         if clamped != goal {
             limits.insert(Limit::ReferenceRange);
         }
-        let [low, high] = bounds.range.map(|bound| i64::from(bound) << EXTRA_BITS);
-        // It begins where it is, which may be outside.
-        let [lowest, highest] = self.extremes.map(|extreme| extreme.max(low).min(high));
-        let range = [lowest.min(self.from), highest.max(self.from)];
+        if self.ends_for != Some((bounds.range, bounds.limits.jerk)) {
+            self.set_ends(bounds);
+        }
         let before = self.shaper.value();
-        let limited = self.shaper.step(&bounds.limits, range, clamped);
+        let limited = self.shaper.step(&bounds.limits, &self.ends, clamped);
         if limited.speed {
             limits.insert(Limit::ReferenceSpeed);
         }
@@ -207,6 +210,16 @@ impl ReferenceState {
             change: self.shaper.value() - before,
             acceleration: self.shaper.acceleration(),
         }
+    }
+
+    /// Makes the ends of the shaper's range for these bounds.
+    #[cold]
+    fn set_ends(&mut self, bounds: &ReferenceBounds) {
+        let [low, high] = bounds.range.map(|bound| i64::from(bound) << EXTRA_BITS);
+        // It begins where it is, which may be outside.
+        let [lowest, highest] = self.extremes.map(|extreme| extreme.max(low).min(high));
+        self.ends = bounds.limits.ends([lowest.min(self.from), highest.max(self.from)]);
+        self.ends_for = Some((bounds.range, bounds.limits.jerk));
     }
 
     /// `from + s (goal − from)`.

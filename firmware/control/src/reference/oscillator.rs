@@ -20,12 +20,11 @@ pub const fn sine(phase: u32) -> i32 {
     // The second and third quarter mirror the first and fourth.
     let x = if (phase ^ phase << 1) >> 31 == 1 { i32::MIN.wrapping_sub(turned) } else { turned };
     let square = product(x, x);
-    let mut sum = C[4];
-    let mut n = 4;
-    while n > 0 {
-        n -= 1;
-        sum = C[n] + product(sum, square);
-    }
+    // Up to here a sum is below 1/4: four times of it leaves the product in the upper half of 64 bits.
+    let mut sum = C[3] + upper(C[4] << 2, square);
+    sum = C[2] + upper(sum << 2, square);
+    sum = C[1] + upper(sum << 2, square);
+    sum = C[0] + product(sum, square);
     // The polynomial is 4 steps above 1 at its end.
     let value = product(sum, x);
     if value > ONE {
@@ -40,6 +39,11 @@ pub const fn sine(phase: u32) -> i32 {
 /// Product in 2⁻³⁰, rounded; both at most 2 in size and one of them at most 1.
 const fn product(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64 + (1 << (BITS - 1))) >> BITS) as i32
+}
+
+/// Upper half of a product, rounded.
+const fn upper(a: i32, b: i32) -> i32 {
+    ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32
 }
 
 /// Triangle that starts at 0 rising, exact.

@@ -23,6 +23,8 @@
 //!
 //! Distances are compared without root or division: in units of `j` both sides are squared, or multiplied by `2 A`.
 
+use crate::scale::saturated;
+
 /// Bits behind the point of the state, in units of the jerk: ticks, ticks², ticks³.
 const STATE_BITS: u32 = 12;
 
@@ -36,7 +38,7 @@ const RISE_SHIFT: u32 = STATE_BITS - RISE_BITS;
 const LONGEST_RISE: i32 = 1024;
 
 /// Speed at which comparisons saturate, ticks².
-const LARGEST: i64 = 1 << 27;
+const LARGEST: i32 = 1 << 27;
 
 /// Distance, ticks³, by which a locked goal may miss what the filter expected: 512 for a goal with the largest jerk, and corners
 /// between the points of a stream.
@@ -96,7 +98,14 @@ impl ShaperLimits {
         let scale = i64::from(self.scale);
         // 96 bits less the lowest 32; the product of the low halves is without sign.
         let product = high * scale + ((low.cast_unsigned() * u64::from(self.scale)) >> 32).cast_signed();
-        product >> self.shift
+        // Below 32, said so that the shift takes half as many instructions.
+        product >> (self.shift & 31)
+    }
+
+    /// Both ends of a range (2⁻⁴⁰), for [`Shaper::step`].
+    #[must_use]
+    pub fn ends(&self, range: [i64; 2]) -> Ends {
+        Ends(range.map(|end| self.state_of(end)))
     }
 
     /// `state`, in 2⁻⁴⁰.
@@ -119,6 +128,10 @@ impl ShaperLimits {
         (i32::from(self.rise) - taken.cast_signed()).max(1 << RISE_BITS)
     }
 }
+
+/// Ends of a range in units of the state, made by [`ShaperLimits::ends`] once for many ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ends([i64; 2]);
 
 /// A motion and the distance to where it has to stop; the motion is towards + if its speed is positive.
 #[derive(Clone, Copy)]
@@ -251,7 +264,7 @@ impl Motion {
     /// Speed, ticks², saturated.
     #[inline]
     fn ticks(speed: i64) -> i32 {
-        (speed >> STATE_BITS).clamp(-LARGEST, LARGEST) as i32
+        saturated(speed >> STATE_BITS).max(-LARGEST).min(LARGEST)
     }
 
     /// Acceleration, 1/16 tick, saturated at twice the longest rise.
@@ -259,6 +272,26 @@ impl Motion {
     fn rise(acceleration: i32) -> i32 {
         const BEYOND: i32 = LONGEST_RISE << (RISE_BITS + 1);
         (acceleration >> RISE_SHIFT).clamp(-BEYOND, BEYOND)
+    }
+}
+
+/// A motion as it is compared.
+#[derive(Clone, Copy)]
+struct Course {
+    /// Speed over the jerk, ticks².
+    speed: i32,
+    /// Acceleration over the jerk, 1/16 tick.
+    rise: i32,
+    /// Speed by the time the acceleration is zero, ticks².
+    end: i32,
+}
+
+impl Course {
+    #[inline]
+    fn of(speed: i64, acceleration: i32) -> Self {
+        let (speed, rise) = (Motion::ticks(speed), Motion::rise(acceleration));
+        let gain = Approach::gain(rise);
+        Self { speed, rise, end: if rise < 0 { speed - gain } else { speed + gain } }
     }
 }
 
@@ -317,16 +350,17 @@ impl Shaper {
     fn count_in(&mut self, limits: &ShaperLimits) {
         let before = ShaperLimits { jerk: self.jerk, ..ShaperLimits::default() };
         let again = |state: i64| limits.state_of(before.value_of(state));
+        let fastest = i64::from(LARGEST) << STATE_BITS;
         self.state = limits.state_of(self.value);
-        self.speed = again(self.speed).clamp(-LARGEST << STATE_BITS, LARGEST << STATE_BITS);
+        self.speed = again(self.speed).clamp(-fastest, fastest);
         let longest = i64::from(LONGEST_RISE) << STATE_BITS;
         self.acceleration = again(self.acceleration.into()).clamp(-longest, longest) as i32;
         self.jerk = limits.jerk;
         self.restart();
     }
 
-    /// One tick towards `goal`. Inside `range` the value never leaves it: it stops before either end.
-    pub fn step(&mut self, limits: &ShaperLimits, range: [i64; 2], goal: i64) -> Limited {
+    /// One tick towards `goal`. Inside the range whose `ends` these are the value never leaves it: it stops before either end.
+    pub fn step(&mut self, limits: &ShaperLimits, ends: &Ends, goal: i64) -> Limited {
         if self.jerk != limits.jerk {
             self.count_in(limits);
         }
@@ -335,8 +369,7 @@ impl Shaper {
         let inward = i32::from(limits.rise);
         let outward = limits.outward(self.value);
         let bounds = Bounds {
-            limits,
-            range,
+            ends,
             most: if self.value < 0 { [outward, inward] } else { [inward, outward] },
             speed: limits.speed,
         };
@@ -409,7 +442,7 @@ impl Shaper {
         let slowed = self.slowed(bounds, wanted);
         let mut acceleration = self.bounded(bounds, slowed);
         let speed = self.speed + i64::from(acceleration);
-        let [low, high] = bounds.hold(speed, acceleration, self.state + speed, false);
+        let [low, high] = bounds.hold(Course::of(speed, acceleration), self.state + speed, false);
         if !(low && high) {
             let brake = if high || (!low && speed < 0) { ONE } else { -ONE };
             acceleration = self.bounded(bounds, self.acceleration + brake);
@@ -424,8 +457,9 @@ impl Shaper {
     #[inline]
     fn slowed(&self, bounds: &Bounds, wanted: i32) -> i32 {
         let sign = if wanted < 0 { -1 } else { 1 };
-        let too_fast =
-            |acceleration: i32| bounds.too_fast(self.speed + i64::from(acceleration), acceleration);
+        let too_fast = |acceleration: i32| {
+            bounds.too_fast(Course::of(self.speed + i64::from(acceleration), acceleration))
+        };
         if !too_fast(wanted) {
             return wanted;
         }
@@ -446,9 +480,7 @@ impl Shaper {
 
 /// Limits at the present value.
 struct Bounds<'l> {
-    limits: &'l ShaperLimits,
-    /// 2⁻⁴⁰
-    range: [i64; 2],
+    ends: &'l Ends,
     /// Largest acceleration towards − and towards +, 1/16 tick.
     most: [i32; 2],
     /// ticks²
@@ -460,41 +492,32 @@ impl Bounds<'_> {
     #[inline]
     fn allow(&self, seen: &Motion, target: i64) -> bool {
         let [below, above] = self.most;
-        let rise = Motion::rise(seen.acceleration);
-        -below <= rise
-            && rise <= above
-            && Motion::ticks(seen.speed).abs() <= self.speed
-            && !self.too_fast(seen.speed, seen.acceleration)
-            && self.hold(seen.speed, seen.acceleration, target, true) == [true; 2]
+        let course = Course::of(seen.speed, seen.acceleration);
+        -below <= course.rise
+            && course.rise <= above
+            && course.speed.abs() <= self.speed
+            && !self.too_fast(course)
+            && self.hold(course, target, true) == [true; 2]
     }
 
     /// Whether the speed will be beyond its limit by the time the acceleration is zero.
     #[inline]
-    fn too_fast(&self, speed: i64, acceleration: i32) -> bool {
-        let gain = Approach::gain(Motion::rise(acceleration));
-        let (speed, gain) = (Motion::ticks(speed), if acceleration < 0 { -gain } else { gain });
-        let end = speed + gain;
-        end.abs() > self.speed && (end < 0) == (acceleration < 0)
+    fn too_fast(&self, course: Course) -> bool {
+        course.end.abs() > self.speed && (course.end < 0) == (course.rise < 0)
     }
 
     /// Whether a motion at `value` stops before the lower and before the upper end of the range.
     #[inline]
-    fn hold(&self, speed: i64, acceleration: i32, value: i64, lenient: bool) -> [bool; 2] {
-        let [low, high] = self.range;
+    fn hold(&self, course: Course, value: i64, lenient: bool) -> [bool; 2] {
+        let Ends([low, high]) = *self.ends;
         // Braked by the acceleration towards the other end.
         let [below, above] = self.most;
-        let (speed, rise) = (Motion::ticks(speed), Motion::rise(acceleration));
-        let gain = Approach::gain(rise);
-        let end = if rise < 0 { speed - gain } else { speed + gain };
+        let Course { speed, rise, end } = course;
         let distance = |from: i64, to: i64| (to - from) >> STATE_BITS;
-        let down = (speed >= 0 && end >= 0) || {
-            let distance = distance(self.limits.state_of(low), value);
-            Approach { speed: -speed, rise: -rise, distance }.stops(above, lenient)
-        };
-        let up = (speed <= 0 && end <= 0) || {
-            let distance = distance(value, self.limits.state_of(high));
-            Approach { speed, rise, distance }.stops(below, lenient)
-        };
+        let down = (speed >= 0 && end >= 0)
+            || Approach { speed: -speed, rise: -rise, distance: distance(low, value) }.stops(above, lenient);
+        let up = (speed <= 0 && end <= 0)
+            || Approach { speed, rise, distance: distance(value, high) }.stops(below, lenient);
         [down, up]
     }
 }

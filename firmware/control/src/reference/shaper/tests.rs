@@ -61,7 +61,7 @@ impl Run {
 
     fn tick(&mut self, goal: i64) {
         let before = self.shaper;
-        let limited = self.shaper.step(&self.limits, self.range, goal);
+        let limited = self.shaper.step(&self.limits, &self.limits.ends(self.range), goal);
         let now = self.shaper;
         let most = i64::from(self.limits.rise) << RISE_SHIFT;
         // Where it locks, a few steps of the jerk come together; a locked value follows the grid of the goal.
@@ -259,7 +259,7 @@ fn numbers_at_the_end_of_the_scale_neither_panic_nor_stick() {
                         shaper.restart();
                     }
                     for _ in 0..200 {
-                        shaper.step(&limits, [-end, end], goal);
+                        shaper.step(&limits, &limits.ends([-end, end]), goal);
                     }
                 }
                 let jerk = i64::from(limits.jerk);
