@@ -10,6 +10,7 @@ use crate::compensator::{CompensatorInput, CompensatorState, compensate};
 use crate::correction::lead::{Lead, Led};
 use crate::drive::{Loops, PositionInput, TorqueInput};
 use crate::encoder::EncoderChannel;
+use crate::encoder::channel::EncoderFault;
 use crate::encoder::stuck::StuckWatch;
 use crate::observer::{Motion, Observer};
 use crate::reference::{Origin, ReferenceConfig, ReferenceOutput, ReferenceState};
@@ -175,13 +176,17 @@ impl Controller {
 
     fn sense(&mut self, input: &TickInput, limits: &mut Limits) -> Readings {
         let config = &self.config;
-        let observed = [0, 1].map(|n: usize| self.encoders[n].observe(&config.encoder[n], &input.encoder[n]));
-        let counts = observed.map(|encoder| encoder.position_counts);
-        let theta = [0, 1].map(|n: usize| config.eccentricity[n].corrected(observed[n].angle));
-        if observed.iter().any(|encoder| encoder.repaired) {
+        // One by one: an array of observations would be copied about.
+        let [first, second] = &mut self.encoders;
+        let pulley = first.observe(&config.encoder[0], &input.encoder[0]);
+        let joint = second.observe(&config.encoder[1], &input.encoder[1]);
+        let counts = [pulley.position_counts, joint.position_counts];
+        let theta =
+            [config.eccentricity[0].corrected(pulley.angle), config.eccentricity[1].corrected(joint.angle)];
+        if pulley.repaired || joint.repaired {
             limits.insert(Limit::FrameRepaired);
         }
-        if observed.iter().any(|encoder| encoder.marginal) {
+        if pulley.marginal || joint.marginal {
             limits.insert(Limit::MagnetMarginal);
         }
         let tensions = config.tension.tensions(input.tension_raw);
@@ -194,7 +199,7 @@ impl Controller {
         let motion = self.observer.observe(
             &config.observer,
             theta[0],
-            !observed[0].repaired,
+            !pulley.repaired,
             supply.current,
             measured_load,
         );
@@ -214,8 +219,8 @@ impl Controller {
         let found = if self.supervisor.watches() {
             let bridge =
                 input.bridge_fault.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
-            let encoder = (0..2)
-                .find_map(|n| observed[n].fault.map(|bad| Detection::new(bad.fault, n, bad.got, bad.limit)));
+            let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
+            let encoder = pulley.fault.map(|bad| of(0, bad)).or_else(|| joint.fault.map(|bad| of(1, bad)));
             bridge.or(supply.found).or(encoder).or(tension).or_else(|| self.stand_still(counts))
         } else {
             None
@@ -282,8 +287,7 @@ impl Controller {
         } else {
             compensation.theta_d = Angle::from_bits(reference.value_bits);
             compensation.omega_d = reference.speed(config.rate_hz);
-            let own =
-                config.joint.torque(config.joint.direction.of(compensation.omega_d), compensation.theta_d);
+            let own = config.joint.torque_along(compensation.omega_d, compensation.theta_d);
             compensation.torque_out = compensation.torque_out.minus(own);
             let compensated = compensate(&config.compensator, &mut self.compensator, &compensation);
             if compensated.limited {

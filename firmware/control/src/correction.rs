@@ -42,17 +42,22 @@ pub struct MotorCorrection {
     friction: MotorFriction,
     gear: GearFriction,
     cogging: Cogging,
+    /// One of them is switched on.
+    acts: bool,
 }
 
 impl MotorCorrection {
     /// The torques of these parameters; `None` if a value is beyond what fixed point holds.
     #[must_use]
     pub fn new(parameters: &Parameters) -> Option<Self> {
+        let own = &parameters.correction;
+        let switches = [own.motor_friction.enable, own.gear_friction.enable, own.cogging.enable];
         Some(Self {
-            direction: SmoothSign::new(parameters.correction.reversal_speed)?,
+            direction: SmoothSign::new(own.reversal_speed)?,
             friction: MotorFriction::new(parameters)?,
             gear: GearFriction::new(parameters)?,
             cogging: Cogging::new(parameters),
+            acts: switches.iter().any(|switch| *switch != 0.0),
         })
     }
 
@@ -60,9 +65,22 @@ impl MotorCorrection {
     #[must_use]
     #[inline]
     pub fn torque(&self, direction: Share, speed: Speed, angle: Angle, carried: Torque) -> Torque {
+        if !self.acts {
+            return Torque::ZERO;
+        }
         self.friction
             .torque(direction, speed)
             .plus(self.gear.torque(direction, carried))
             .plus(self.cogging.torque(angle))
+    }
+
+    /// The same in the direction of a speed.
+    #[must_use]
+    #[inline]
+    pub fn torque_along(&self, speed: Speed, angle: Angle, carried: Torque) -> Torque {
+        if !self.acts {
+            return Torque::ZERO;
+        }
+        self.torque(self.direction.of(speed), speed, angle, carried)
     }
 }

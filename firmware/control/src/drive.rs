@@ -172,9 +172,7 @@ impl Loops {
         }
         let wanted = config.acceleration_feedforward.apply(input.acceleration);
         let wanted = self.feedforward.approach(config.acceleration_filter, wanted);
-        let direction = drive.correction.direction.of(input.command_speed);
-        let motor =
-            drive.correction.torque(direction, input.command_speed, input.motion.angle, input.torque_in);
+        let motor = drive.correction.torque_along(input.command_speed, input.motion.angle, input.torque_in);
         let speed_error = input.command_speed.minus(input.motion.speed);
         let acceleration = config
             .proportional

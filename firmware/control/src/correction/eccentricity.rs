@@ -36,9 +36,12 @@ impl Eccentricity {
     #[must_use]
     #[inline]
     pub fn corrected(&self, shown: Angle) -> Angle {
-        if self.amplitude == Angle::ZERO {
-            return shown;
-        }
+        if self.amplitude == Angle::ZERO { shown } else { self.freed(shown) }
+    }
+
+    /// Out of line: the sine is long, and most encoders are centred.
+    #[inline(never)]
+    fn freed(&self, shown: Angle) -> Angle {
         shown.minus(self.harmonic.sine(shown).of(self.amplitude)).plus(self.at_zero)
     }
 }

@@ -81,11 +81,21 @@ impl JointCorrection {
         friction.plus(turned.limited(self.spring.limit))
     }
 
+    /// The same in the direction of a speed.
+    #[must_use]
+    #[inline]
+    pub fn torque_along(&self, speed: Speed, theta_out: Angle) -> Torque {
+        if self.friction.level == Torque::ZERO && self.spring.limit == Torque::ZERO {
+            return Torque::ZERO;
+        }
+        self.torque(self.direction.of(speed), theta_out)
+    }
+
     /// Angle by which the input pulley has to lead for that torque.
     #[must_use]
     #[inline]
     pub fn stretch(&self, torque: Torque) -> Angle {
-        self.stretch.apply(torque)
+        if torque == Torque::ZERO { Angle::ZERO } else { self.stretch.apply(torque) }
     }
 }
 

@@ -34,6 +34,8 @@ pub struct Leads {
     sheath: Option<SheathCorrection>,
     /// `m g l`: torque that the weight takes at a small angle. Measured torque is zero within a play.
     weight: Gain<Angle, Torque>,
+    /// One of them is switched on.
+    acts: bool,
 }
 
 /// Desired motion of the joint, and the friction on its way.
@@ -56,7 +58,9 @@ impl Leads {
         let sheath = SheathCorrection::new(parameters)?;
         let followed = parameters.sheath.adapts == 1.0;
         let load = &parameters.load;
+        let own = &parameters.correction;
         Some(Self {
+            acts: own.backlash.enable != 0.0 || (!followed && own.sheath.enable != 0.0),
             backlash: Backlash::new(parameters)?,
             sheath: (!followed).then_some(sheath),
             weight: Gain::new(load.mass * GRAVITY_M_PER_S2 * load.arm)?,
@@ -67,6 +71,9 @@ impl Leads {
     #[inline]
     #[must_use]
     pub fn lead(&self, led: &Led) -> Angle {
+        if !self.acts {
+            return Angle::ZERO;
+        }
         let Led { speed, theta, friction } = *led;
         let torque_out = self.weight.apply(theta);
         let signed = if speed < Speed::ZERO { friction.negated() } else { friction };
@@ -87,6 +94,10 @@ impl Lead {
     /// Moves towards `target` for a tick; angle and speed of the lead.
     #[inline]
     pub fn follow(&mut self, config: &LeadConfig, target: Angle) -> (Angle, Speed) {
+        // Nearly always.
+        if target == Angle::ZERO && self.0 == Angle::ZERO {
+            return (Angle::ZERO, Speed::ZERO);
+        }
         let step = target.minus(self.0).limited(config.step);
         self.0 = self.0.plus(step);
         (self.0, config.rate.apply(step))

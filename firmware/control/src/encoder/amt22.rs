@@ -12,10 +12,6 @@ use super::{CountRaw, FrameDecoder, Reading};
 /// Bits of a frame.
 pub const FRAME_BITS: u8 = 16;
 
-/// K1 and the bits that it checks; K0 and the bits that it checks.
-const CHECKED_BY_K1: u16 = 0xaaaa;
-const CHECKED_BY_K0: u16 = 0x5555;
-
 /// Bits below the position.
 const BELOW_POSITION: u32 = 2;
 
@@ -69,9 +65,13 @@ impl fmt::Display for Fault {
 /// # Errors
 /// [`Fault`] when a check bit does not match or the frame is not one of the 12-bit type.
 pub const fn decode(frame_raw: u16) -> Result<CountRaw, Fault> {
-    let k1_holds = (frame_raw & CHECKED_BY_K1).count_ones() % 2 == 1;
-    let k0_holds = (frame_raw & CHECKED_BY_K0).count_ones() % 2 == 1;
-    if !(k1_holds && k0_holds) {
+    // Folded by halves: bit 1 is left with the parity of what K1 checks, bit 0 with that of K0.
+    let mut folded = frame_raw as u32;
+    folded ^= folded >> 8;
+    folded ^= folded >> 4;
+    folded ^= folded >> 2;
+    if folded & 3 != 3 {
+        let (k1_holds, k0_holds) = (folded & 2 != 0, folded & 1 != 0);
         return Err(Fault::Check { frame_raw, k1_holds, k0_holds });
     }
     if frame_raw.trailing_zeros() < BELOW_POSITION {

@@ -27,14 +27,16 @@ pub struct EncoderConfig {
 impl EncoderConfig {
     /// Angle at a count, rad: `direction·(count − zero)·2π/4096`, within half a step of 2⁻²⁰ plus 3e-10 of it, saturated.
     #[must_use]
+    #[inline]
     pub fn angle(&self, position_counts: i32) -> Angle {
         /// Bits of [`RAD_PER_COUNT`] below 2⁻²⁰ rad.
         const EXTRA_BITS: u32 = 20;
         /// 2π/4096 in 2⁻⁴⁰ rad: 2^29 π.
-        const RAD_PER_COUNT: i64 = 1_686_629_713;
-        let from_zero = i64::from(position_counts) - i64::from(self.zero_counts);
-        let directed = if self.reversed { -from_zero } else { from_zero };
-        let fine = directed * RAD_PER_COUNT + (1 << (EXTRA_BITS - 1));
+        const RAD_PER_COUNT: i32 = 1_686_629_713;
+        // What saturates here is far beyond the range of an angle.
+        let from_zero = position_counts.saturating_sub(i32::from(self.zero_counts));
+        let directed = if self.reversed { from_zero.saturating_neg() } else { from_zero };
+        let fine = i64::from(directed) * i64::from(RAD_PER_COUNT) + (1 << (EXTRA_BITS - 1));
         Angle::from_bits(saturated(fine >> EXTRA_BITS))
     }
 }
@@ -87,6 +89,7 @@ impl EncoderChannel {
     ///
     /// After a fault by a jump the position goes on from where the encoder is, so that the counts stay those of the
     /// encoder while the bridge is off.
+    #[inline]
     pub fn observe(&mut self, config: &EncoderConfig, word: &EncoderWord) -> Observation {
         let fresh = self.sequence.replace(word.sequence) != Some(word.sequence);
         let (bad, marginal) = match self.take(config, *word, fresh) {
@@ -105,6 +108,7 @@ impl EncoderChannel {
         Observation { position_counts, angle: config.angle(position_counts), repaired, marginal, fault }
     }
 
+    #[inline]
     fn take(&mut self, config: &EncoderConfig, word: EncoderWord, fresh: bool) -> Result<bool, Bad> {
         if word.bus_error || !fresh {
             return Err(Bad::Missing);
@@ -126,6 +130,7 @@ impl EncoderChannel {
         Ok(reading.marginal)
     }
 
+    #[cold]
     fn fault(&mut self, config: &EncoderConfig, bad: &Bad) -> EncoderFault {
         let in_a_row =
             |fault| EncoderFault { fault, got: f32::from(self.bad), limit: f32::from(config.bad_frames) };
