@@ -55,12 +55,30 @@ impl Supply {
         let current = config.current_gain.apply(code(current_raw).minus(config.current_zero));
         let bus = config.bus_gain.apply(code(bus_raw));
         let bus_filtered = self.bus.get_or_insert_with(|| Sum::at(bus)).approach(config.bus_filter, bus);
+        let fine = current <= config.over_current
+            && current >= config.over_current.negated()
+            && bus >= config.bus_range[0]
+            && bus <= config.bus_range[1];
+        let found = if fine {
+            // Nearly always.
+            (self.over_current, self.under_voltage, self.over_voltage) = Default::default();
+            None
+        } else {
+            self.look(config, current, bus)
+        };
+        SupplyReading { current, bus, bus_filtered, found }
+    }
+
+    /// What is wrong, and for how long.
+    #[cold]
+    #[inline(never)]
+    fn look(&mut self, config: &SupplyConfig, current: Current, bus: Voltage) -> Option<Detection> {
         let [low, high] = config.bus_range;
         let over_current =
             self.over_current.count(current.magnitude() > config.over_current, config.over_current_ticks);
         let under = self.under_voltage.count(bus < low, config.bus_ticks);
         let over = self.over_voltage.count(bus > high, config.bus_ticks);
-        let found = if over_current {
+        if over_current {
             Some(Detection::new(Fault::OverCurrent, 0, current.to_f32(), config.over_current.to_f32()))
         } else if under {
             Some(Detection::new(Fault::BusUnderVoltage, 0, bus.to_f32(), low.to_f32()))
@@ -68,7 +86,6 @@ impl Supply {
             Some(Detection::new(Fault::BusOverVoltage, 0, bus.to_f32(), high.to_f32()))
         } else {
             None
-        };
-        SupplyReading { current, bus, bus_filtered, found }
+        }
     }
 }

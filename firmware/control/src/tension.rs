@@ -99,13 +99,14 @@ impl TensionChannels {
         let [low, high] = config.rail_raw;
         let at_rail = |code_raw: u16| code_raw < low || code_raw > high;
         let off = |tension: Tension| tension < config.slack || tension > config.over;
-        let wrong = |n: usize| config.fitted.has(n) && (at_rail(codes_raw[n]) || off(tensions[n]));
-        let found = if [0, 1, 2, 3].into_iter().any(wrong) {
-            let channels = [0, 1, 2, 3].map(|n| {
-                let there = config.fitted.has(n);
-                there.then(|| self.channel(config, checks, n, codes_raw[n], tensions[n])).flatten()
-            });
-            channels.into_iter().flatten().next()
+        let wrong = |n: usize| at_rail(codes_raw[n]) || off(tensions[n]);
+        let any = match config.fitted {
+            Fitted::All => wrong(0) || wrong(1) || wrong(2) || wrong(3),
+            Fitted::Input => wrong(0) || wrong(2),
+            Fitted::Nothing => false,
+        };
+        let found = if any {
+            self.channels(config, checks, codes_raw, tensions)
         } else {
             // Nearly always.
             (self.rail, self.slack, self.over) = Default::default();
@@ -113,6 +114,23 @@ impl TensionChannels {
         };
         let inconsistent = self.compare(config, tensions, lag);
         found.or(inconsistent.filter(|_| checks.load))
+    }
+
+    /// The channels one by one, and the first fault.
+    #[cold]
+    #[inline(never)]
+    fn channels(
+        &mut self,
+        config: &TensionConfig,
+        checks: TensionChecks,
+        codes_raw: [u16; 4],
+        tensions: [Tension; 4],
+    ) -> Option<Detection> {
+        let channels = [0, 1, 2, 3].map(|n| {
+            let there = config.fitted.has(n);
+            there.then(|| self.channel(config, checks, n, codes_raw[n], tensions[n])).flatten()
+        });
+        channels.into_iter().flatten().next()
     }
 
     fn channel(
@@ -150,8 +168,7 @@ impl TensionChannels {
         let filtered: [Tension; 4] = core::array::from_fn(|n| sums[n].approach(config.filter, tensions[n]));
         let twice_stretch = config.stretch.apply(lag);
         let twice_rest = config.pretension.plus(config.pretension);
-        let mut found = None;
-        for cable in [0, 1] {
+        let ends = |cable: usize| {
             let from_stretch =
                 if cable == 0 { twice_rest.plus(twice_stretch) } else { twice_rest.minus(twice_stretch) };
             let input = filtered[2 * cable];
@@ -159,20 +176,68 @@ impl TensionChannels {
                 Fitted::All => filtered[2 * cable + 1],
                 Fitted::Input | Fitted::Nothing => from_stretch.minus(input),
             };
-            let (less, more) = if input < output { (input, output) } else { (output, input) };
-            let allowed = config.ratio.apply(less).plus(config.margin);
-            let apart = input.plus(output).minus(from_stretch).magnitude();
+            Ends::new(config, input, output, from_stretch)
+        };
+        let cables = [ends(0), ends(1)];
+        if cables[0].fit(config) && cables[1].fit(config) {
+            // Nearly always.
+            (self.inconsistent, self.unlike_stretch) = Default::default();
+            return None;
+        }
+        self.misfit(config, &cables)
+    }
+
+    /// Counts how long ends do not fit, and returns the first fault.
+    #[cold]
+    #[inline(never)]
+    fn misfit(&mut self, config: &TensionConfig, cables: &[Ends; 2]) -> Option<Detection> {
+        let mut found = None;
+        for (cable, ends) in cables.iter().enumerate() {
+            let Ends { more, allowed, apart } = *ends;
             let wrong = self.inconsistent[cable].count(more > allowed, config.consistency_ticks);
-            let unlike =
-                self.unlike_stretch[cable].count(apart > config.stretch_margin, config.stretch_ticks);
+            let unlike = self.unlike_stretch[cable].count(ends.unlike(config), config.stretch_ticks);
             if found.is_none() && wrong {
                 found =
                     Some(Detection::new(Fault::TensionInconsistent, cable, more.to_f32(), allowed.to_f32()));
             } else if found.is_none() && unlike {
-                let (got, limit) = (apart.to_f32(), config.stretch_margin.to_f32());
+                let (got, limit) = (apart.magnitude().to_f32(), config.stretch_margin.to_f32());
                 found = Some(Detection::new(Fault::StretchInconsistent, cable, got, limit));
             }
         }
         found
+    }
+}
+
+/// Both ends of a cable.
+#[derive(Clone, Copy)]
+struct Ends {
+    /// The larger tension, and how large it may be.
+    more: Tension,
+    allowed: Tension,
+    /// Sum of both less the one that the stretch tells.
+    apart: Tension,
+}
+
+impl Ends {
+    #[inline]
+    fn new(config: &TensionConfig, input: Tension, output: Tension, from_stretch: Tension) -> Self {
+        let (less, more) = if input < output { (input, output) } else { (output, input) };
+        Self {
+            more,
+            allowed: config.ratio.apply(less).plus(config.margin),
+            apart: input.plus(output).minus(from_stretch),
+        }
+    }
+
+    /// Whether they contradict the stretch.
+    #[inline]
+    fn unlike(self, config: &TensionConfig) -> bool {
+        self.apart > config.stretch_margin || self.apart < config.stretch_margin.negated()
+    }
+
+    /// Whether they fit friction and stretch.
+    #[inline]
+    fn fit(self, config: &TensionConfig) -> bool {
+        self.more <= self.allowed && !self.unlike(config)
     }
 }

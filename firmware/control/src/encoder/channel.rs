@@ -92,18 +92,13 @@ impl EncoderChannel {
     #[inline]
     pub fn observe(&mut self, config: &EncoderConfig, word: &EncoderWord) -> Observation {
         let fresh = self.sequence.replace(word.sequence) != Some(word.sequence);
-        let (bad, marginal) = match self.take(config, *word, fresh) {
+        let (repaired, marginal, fault) = match self.take(config, *word, fresh) {
             Ok(marginal) => {
                 self.bad = 0;
-                (None, marginal)
+                (false, marginal, None)
             }
-            Err(bad) => {
-                self.bad = self.bad.saturating_add(1);
-                (Some(bad), false)
-            }
+            Err(bad) => (true, false, self.miss(config, &bad)),
         };
-        let repaired = bad.is_some();
-        let fault = bad.filter(|_| self.bad >= config.bad_frames).map(|bad| self.fault(config, &bad));
         let position_counts = self.position.map_or(0, |position| position.position_counts());
         Observation { position_counts, angle: config.angle(position_counts), repaired, marginal, fault }
     }
@@ -121,7 +116,10 @@ impl EncoderChannel {
             }
             Some(position) => {
                 // The shaft went on during the ticks without a good frame.
-                let limit = config.step_limit.over_ticks(u16::from(self.bad) + 1);
+                let limit = match self.bad {
+                    0 => config.step_limit,
+                    bad => config.step_limit.over_ticks(u16::from(bad) + 1),
+                };
                 position
                     .advance(limit, reading.count_raw)
                     .map_err(|jump| Bad::Jump(reading.count_raw, jump.step_counts))?;
@@ -130,7 +128,14 @@ impl EncoderChannel {
         Ok(reading.marginal)
     }
 
+    /// Counts a bad frame.
     #[cold]
+    #[inline(never)]
+    fn miss(&mut self, config: &EncoderConfig, bad: &Bad) -> Option<EncoderFault> {
+        self.bad = self.bad.saturating_add(1);
+        (self.bad >= config.bad_frames).then(|| self.fault(config, bad))
+    }
+
     fn fault(&mut self, config: &EncoderConfig, bad: &Bad) -> EncoderFault {
         let in_a_row =
             |fault| EncoderFault { fault, got: f32::from(self.bad), limit: f32::from(config.bad_frames) };

@@ -424,12 +424,15 @@ impl Shaper {
         let fall = (fall << halvings).min(LONGEST_RISE << RISE_BITS);
         let may = |steps: i32| {
             const BEYOND: i32 = LONGEST_RISE << (RISE_BITS + 1);
+            if own_rise + (steps << RISE_BITS) > rise {
+                return false;
+            }
             let after = Approach {
                 speed: (relative.speed + steps) << halvings,
                 rise: ((relative.rise + (steps << RISE_BITS)) << halvings).clamp(-BEYOND, BEYOND),
                 distance: (relative.distance - i64::from(steps)) << halvings,
             };
-            own_rise + (steps << RISE_BITS) <= rise && after.stops(fall, false)
+            after.stops(fall, false)
         };
         let steps = if may(1) {
             1
@@ -439,10 +442,15 @@ impl Shaper {
             -1
         };
         let wanted = self.acceleration + towards * steps * ONE;
-        let slowed = self.slowed(bounds, wanted);
+        let course = |acceleration: i32| Course::of(self.speed + i64::from(acceleration), acceleration);
+        let mut next = course(wanted);
+        let slowed = if bounds.too_fast(next) { self.slowed(bounds, wanted) } else { wanted };
         let mut acceleration = self.bounded(bounds, slowed);
+        if acceleration != wanted {
+            next = course(acceleration);
+        }
         let speed = self.speed + i64::from(acceleration);
-        let [low, high] = bounds.hold(Course::of(speed, acceleration), self.state + speed, false);
+        let [low, high] = bounds.hold(next, self.state + speed, false);
         if !(low && high) {
             let brake = if high || (!low && speed < 0) { ONE } else { -ONE };
             acceleration = self.bounded(bounds, self.acceleration + brake);
@@ -453,19 +461,14 @@ impl Shaper {
         Limited { acceleration: true, speed: slowed != wanted }
     }
 
-    /// `wanted`, or less where the speed would be beyond its limit by the time the acceleration is zero.
+    /// Less than `wanted`, with which the speed would be beyond its limit by the time the acceleration is zero.
     #[inline]
     fn slowed(&self, bounds: &Bounds, wanted: i32) -> i32 {
         let sign = if wanted < 0 { -1 } else { 1 };
-        let too_fast = |acceleration: i32| {
-            bounds.too_fast(Course::of(self.speed + i64::from(acceleration), acceleration))
-        };
-        if !too_fast(wanted) {
-            return wanted;
-        }
         let held = (sign * self.acceleration).min(sign * wanted).max(0);
         let less = (sign * self.acceleration - (1 << STATE_BITS)).max(0);
-        sign * if too_fast(sign * held) { held.min(less) } else { held }
+        let course = Course::of(self.speed + i64::from(sign * held), sign * held);
+        sign * if bounds.too_fast(course) { held.min(less) } else { held }
     }
 
     /// `wanted` within the limits of the acceleration, and no further from the present one than the jerk allows.
