@@ -158,6 +158,7 @@ impl Loops {
     }
 
     /// Torque for the input pulley that the position loop asks for.
+    #[inline]
     pub fn position(
         &mut self,
         config: &PositionConfig,
@@ -245,6 +246,7 @@ impl Loops {
     }
 
     /// Duty that makes this torque, 1/32767, within all limits.
+    #[inline]
     pub fn duty(
         &mut self,
         config: &DriveConfig,

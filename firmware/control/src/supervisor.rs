@@ -218,8 +218,18 @@ impl Supervisor {
     }
 
     /// One tick of the present state: goes on to the next one, or finds that it cannot.
+    #[inline]
     pub fn step(&mut self, config: &SupervisorConfig, situation: &Situation) -> Option<Detection> {
         self.elapsed = self.elapsed.saturating_add(1);
+        match self.state {
+            State::Off | State::Ready | State::Run | State::Fault => None,
+            State::SelfTest | State::PretensionCheck | State::Homing => self.look(config, situation),
+        }
+    }
+
+    /// Out of line: a run does not come by.
+    #[inline(never)]
+    fn look(&mut self, config: &SupervisorConfig, situation: &Situation) -> Option<Detection> {
         match self.state {
             State::SelfTest => {
                 let verdict = self.rest.look(config, situation)?;
