@@ -167,7 +167,7 @@ impl Loops {
         limits: &mut Limits,
     ) -> Torque {
         let error = input.command.minus(input.motion.angle);
-        let told = input.command.minus(input.measured).magnitude() > config.half_count;
+        let told = !input.command.minus(input.measured).is_at_most(config.half_count);
         if told && self.may_integrate(error.to_bits(), limits) {
             self.acceleration.add(config.integral, error);
         }

@@ -139,6 +139,23 @@ macro_rules! quantity {
                 Self(self.0.saturating_abs())
             }
 
+            /// Whether it is from `low` to `high`, of which `low` is the lesser: one comparison.
+            #[must_use]
+            #[inline]
+            pub const fn is_within(self, low: Self, high: Self) -> bool {
+                let (bits, low, high) = (self.0.to_bits(), low.0.to_bits(), high.0.to_bits());
+                bits.wrapping_sub(low).cast_unsigned() <= high.wrapping_sub(low).cast_unsigned()
+            }
+
+            /// Whether it is from `-limit` to `limit`; `limit` is 0 or more.
+            #[must_use]
+            #[inline]
+            pub const fn is_at_most(self, limit: Self) -> bool {
+                let limit = limit.0.to_bits();
+                let from_low = self.0.to_bits().wrapping_add(limit).cast_unsigned();
+                from_low <= limit.cast_unsigned().wrapping_mul(2)
+            }
+
             /// The nearest value from `-limit` to `limit`; `limit` is 0 or more.
             #[must_use]
             #[inline]
@@ -437,6 +454,23 @@ mod tests {
         assert_eq!(large.apply(angle(1 << 20)).to_bits(), i32::MIN);
         assert_eq!(large.apply(angle(-(1 << 20))).to_bits(), i32::MAX);
         assert_eq!(large.apply(angle(-2)).to_bits(), 2_000_000);
+    }
+
+    #[test]
+    fn ranges_are_asked_by_one_comparison() {
+        let extremes = [i32::MIN, i32::MIN + 1, -7, -1, 0, 1, 6, i32::MAX - 1, i32::MAX];
+        for bits in extremes {
+            for low in extremes {
+                for high in extremes.into_iter().filter(|high| low <= *high) {
+                    let got = angle(bits).is_within(angle(low), angle(high));
+                    assert_eq!(got, low <= bits && bits <= high, "{bits} from {low} to {high}");
+                }
+                if low >= 0 {
+                    let got = angle(bits).is_at_most(angle(low));
+                    assert_eq!(got, -low <= bits && bits <= low, "{bits} of {low}");
+                }
+            }
+        }
     }
 
     #[test]

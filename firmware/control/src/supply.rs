@@ -55,10 +55,8 @@ impl Supply {
         let current = config.current_gain.apply(code(current_raw).minus(config.current_zero));
         let bus = config.bus_gain.apply(code(bus_raw));
         let bus_filtered = self.bus.get_or_insert_with(|| Sum::at(bus)).approach(config.bus_filter, bus);
-        let fine = current <= config.over_current
-            && current >= config.over_current.negated()
-            && bus >= config.bus_range[0]
-            && bus <= config.bus_range[1];
+        let [low, high] = config.bus_range;
+        let fine = current.is_at_most(config.over_current) && bus.is_within(low, high);
         let found = if fine {
             // Nearly always.
             (self.over_current, self.under_voltage, self.over_voltage) = Default::default();

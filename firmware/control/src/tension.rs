@@ -97,8 +97,9 @@ impl TensionChannels {
         lag: Angle,
     ) -> Option<Detection> {
         let [low, high] = config.rail_raw;
-        let at_rail = |code_raw: u16| code_raw < low || code_raw > high;
-        let off = |tension: Tension| tension < config.slack || tension > config.over;
+        // Each in one comparison: the lower limit is the lesser one of both.
+        let at_rail = |code_raw: u16| code_raw.wrapping_sub(low) > high.wrapping_sub(low);
+        let off = |tension: Tension| !tension.is_within(config.slack, config.over);
         let wrong = |n: usize| at_rail(codes_raw[n]) || off(tensions[n]);
         let any = match config.fitted {
             Fitted::All => wrong(0) || wrong(1) || wrong(2) || wrong(3),
@@ -232,7 +233,7 @@ impl Ends {
     /// Whether they contradict the stretch.
     #[inline]
     fn unlike(self, config: &TensionConfig) -> bool {
-        self.apart > config.stretch_margin || self.apart < config.stretch_margin.negated()
+        !self.apart.is_at_most(config.stretch_margin)
     }
 
     /// Whether they fit friction and stretch.
