@@ -188,9 +188,7 @@ impl ReferenceState {
             }
         };
         let goal = self.blended(goal);
-        let [least, most] = window;
-        let (least, most) = (i64::from(least) << EXTRA_BITS, i64::from(most) << EXTRA_BITS);
-        let clamped = goal.max(least).min(most);
+        let clamped = self::clamped(goal, window);
         if clamped != goal {
             limits.insert(Limit::ReferenceRange);
         }
@@ -255,6 +253,18 @@ impl ReferenceState {
         let distance = i64::from(ahead) - i64::from(before);
         (i64::from(before) << EXTRA_BITS) + ((distance * i64::from(self.phase >> 8)) >> (24 - EXTRA_BITS))
     }
+}
+
+/// `goal`, 2⁻⁴⁰, within a window, 2⁻²⁰.
+#[inline]
+fn clamped(goal: i64, window: [i32; 2]) -> i64 {
+    let [least, most] = window.map(i64::from);
+    let place = goal >> EXTRA_BITS;
+    if place > least && place < most {
+        // Nearly always.
+        return goal;
+    }
+    goal.max(least << EXTRA_BITS).min(most << EXTRA_BITS)
 }
 
 #[cfg(test)]
