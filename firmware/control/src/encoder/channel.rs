@@ -89,7 +89,10 @@ impl EncoderChannel {
     ///
     /// After a fault by a jump the position goes on from where the encoder is, so that the counts stay those of the
     /// encoder while the bridge is off.
-    #[expect(clippy::inline_always, reason = "called twice a tick; a call moves as many words as it works on")]
+    #[expect(
+        clippy::inline_always,
+        reason = "called twice a tick; a call moves as many words as it works on"
+    )]
     #[inline(always)]
     pub fn observe(&mut self, config: &EncoderConfig, word: &EncoderWord) -> Observation {
         let fresh = self.sequence.replace(word.sequence) != Some(word.sequence);
