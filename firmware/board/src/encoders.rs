@@ -88,7 +88,9 @@ pub fn ask() {
     if STAGE.load(Ordering::Relaxed) == IDLE {
         for (index, bus) in BUSES.iter().enumerate() {
             let wanted = WANTED[index].load(Ordering::Relaxed);
-            if PRESENT[index].swap(wanted, Ordering::Relaxed) != wanted {
+            // The tick alone writes it, so no exchange is needed.
+            if PRESENT[index].load(Ordering::Relaxed) != wanted {
+                PRESENT[index].store(wanted, Ordering::Relaxed);
                 bus.set_part(present(index));
             }
             bus.select();

@@ -127,7 +127,9 @@ impl Tick {
         TOLD.state.store(output.sample.state as u8, Ordering::Relaxed);
         TOLD.limits.store(output.sample.limits.0, Ordering::Relaxed);
         TOLD.ticks.store(self.controller.tick_count(), Ordering::Relaxed);
-        if PROVOKE_LATE.swap(false, Ordering::Relaxed) {
+        // Nobody comes between: the tick has the highest priority.
+        if PROVOKE_LATE.load(Ordering::Relaxed) {
+            PROVOKE_LATE.store(false, Ordering::Relaxed);
             let period = self.bridge.period_cycles();
             cortex_m::asm::delay(period + period / 5);
         }
