@@ -4,34 +4,16 @@
 #[path = "../../firmware/control/tests/bench/cases.rs"]
 mod cases;
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
-use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
+use bowden_control::tick::{Command, EncoderWord, Queues, TickInput, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
 use bowden_link::message::{Goal, Mode};
 use cases::{Case, Random, draw};
 use virtual_bench::{BenchConfig, Bridge, Channel, LiveBench};
-
-/// Queues into the tick.
-#[derive(Default)]
-struct Queues {
-    commands: VecDeque<Command>,
-    points: VecDeque<i32>,
-}
-
-impl Inbox for Queues {
-    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
-        self.commands.pop_front().map(|command| act(&command))
-    }
-
-    fn stream_point(&mut self) -> Option<i32> {
-        self.points.pop_front()
-    }
-}
 
 /// The virtual bench behind the board's converters.
 struct Board {

@@ -20,6 +20,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
 pub mod compensator;
 pub mod conformance;
 pub mod controller;

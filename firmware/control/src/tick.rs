@@ -82,3 +82,24 @@ impl Inbox for NoInbox {
         None
     }
 }
+
+/// Growing queues, for benches and simulations (feature `alloc`).
+#[cfg(feature = "alloc")]
+#[derive(Clone, Debug, Default)]
+pub struct Queues {
+    /// Commands; the first one is carried out first.
+    pub commands: alloc::collections::VecDeque<Command>,
+    /// Points of a streamed reference, 2⁻²⁰ rad or 2⁻²⁰ N·m.
+    pub points: alloc::collections::VecDeque<i32>,
+}
+
+#[cfg(feature = "alloc")]
+impl Inbox for Queues {
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        self.commands.pop_front().map(|command| act(&command))
+    }
+
+    fn stream_point(&mut self) -> Option<i32> {
+        self.points.pop_front()
+    }
+}

@@ -3,12 +3,11 @@
 //! One control tick is 100 µs, ten steps of the bench. As on the board, an encoder frame is one tick old, and a duty acts
 //! from the next period on.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
-use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
+use bowden_control::tick::{Command, EncoderWord, Queues, TickInput, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
 use bowden_link::message::{Goal, Reference};
@@ -24,23 +23,6 @@ const LARGEST_CODE: f64 = 4095.0;
 const STEPS_PER_UNIT: f64 = 1_048_576.0;
 /// Longest time from power-on to ready \[s\]: self test and pretension check take 0.1 s each.
 const READY_LIMIT_S: f64 = 1.0;
-
-/// Orders and streamed points on their way into the tick.
-#[derive(Debug, Default)]
-struct Queues {
-    commands: VecDeque<Command>,
-    points: VecDeque<i32>,
-}
-
-impl Inbox for Queues {
-    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
-        self.commands.pop_front().map(|command| act(&command))
-    }
-
-    fn stream_point(&mut self) -> Option<i32> {
-        self.points.pop_front()
-    }
-}
 
 /// Bench, converters and controller.
 #[derive(Debug)]

@@ -1,11 +1,10 @@
 //! The joint of `bowden-model` behind the board's pins: encoder frames, converter codes, bridge.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
-use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
+use bowden_control::tick::{Command, EncoderWord, Queues, TickInput, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
 use bowden_link::message::{Goal, Reference};
@@ -18,23 +17,6 @@ use bowden_model::parameters::{
     SheathParameters, TendonParameters,
 };
 use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
-
-/// Queues into the tick.
-#[derive(Default)]
-pub struct Queues {
-    pub commands: VecDeque<Command>,
-    pub points: VecDeque<i32>,
-}
-
-impl Inbox for Queues {
-    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
-        self.commands.pop_front().map(|command| act(&command))
-    }
-
-    fn stream_point(&mut self) -> Option<i32> {
-        self.points.pop_front()
-    }
-}
 
 /// The bench of the paper, as the parameters have it by default.
 pub fn joint() -> JointParameters {

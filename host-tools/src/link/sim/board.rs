@@ -7,7 +7,7 @@ use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
 use bowden_control::service::{Batcher, Identity, Port, Reply, Service, View};
 use bowden_control::snapshot::Snapshot;
-use bowden_control::tick::{Command, Inbox};
+use bowden_control::tick::{Command, Queues};
 use bowden_control::tick_config;
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
 use bowden_link::message::{Boot, Provocation};
@@ -32,23 +32,6 @@ const SUPERVISION: Duration = Duration::from_millis(5);
 
 /// Duty 1.
 const FULL_DUTY: f64 = 32_767.0;
-
-/// Queues into the tick.
-#[derive(Default)]
-struct Queues {
-    commands: VecDeque<Command>,
-    points: VecDeque<i32>,
-}
-
-impl Inbox for Queues {
-    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
-        self.commands.pop_front().map(|command| act(&command))
-    }
-
-    fn stream_point(&mut self) -> Option<i32> {
-        self.points.pop_front()
-    }
-}
 
 /// What the services reach of the tick.
 struct Reach<'b> {
