@@ -4,7 +4,7 @@
 //! The timer's event starts the conversions; 3.5 us later the interrupt is taken, and nothing may delay it: it has
 //! priority 0 alone and critical sections mask priorities 1 and below. The tick has no wait, no lock, no allocation, no log and
 //! no loop whose length depends on data, so its length is that of its longest path, which `cargo xtask bench --board` prints:
-//! 3 282 cycles on the emulated core for a tick that takes a new configuration. Its result is due at the next event of the timer, when the compare values are taken over: 17 000
+//! some 4 000 cycles on the emulated core for a tick that takes a new configuration. Its result is due at the next event of the timer, when the compare values are taken over: 17 000
 //! cycles after the one before at 10 kHz, 8 500 at 20 kHz. A tick that is still busy when the next conversions end is a fault.
 
 use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU16, AtomicU32, Ordering};

@@ -9,8 +9,8 @@ use bowden_on_board_tests::load::under_load;
 use crate::ready;
 use crate::stop::LIVELY;
 
-/// Beginning of the tick steady to 1.5 us; at most 3600 instructions in the mean and 30 % of 17 000 cycles, where 3000 and 20 %
-/// are the goals; compensator at most 400 instructions.
+/// Goals: beginning of the tick steady to 1.5 us; at most 3000 instructions, in the longest tick as well, and 20 % of 17 000
+/// cycles; compensator at most 400 instructions.
 #[test]
 fn the_tick_keeps_its_time_at_full_load() -> Outcome {
     let mut host = ready(1)?;
@@ -19,7 +19,7 @@ fn the_tick_keeps_its_time_at_full_load() -> Outcome {
     // 1.5 us of 170 MHz.
     assert!(load.period.spread() <= 255, "{load:?}");
     assert!((load.period.mean() - 17_000.0).abs() < 1.0, "{load:?}");
-    assert!(load.tick.typical_instructions <= 3600.0 && load.busy.max <= 5100, "{load:?}");
+    assert!(load.tick.worst_instructions <= 3000 && load.busy.max <= 3400, "{load:?}");
     assert!(load.compensator.worst_instructions <= 400, "{load:?}");
     assert!(load.samples[0] >= 19_900 && load.samples[1] == 0, "{load:?}");
     assert!(load.requests >= 500, "{load:?}");
@@ -54,15 +54,12 @@ fn the_joint_runs_at_twenty_kilohertz() -> Outcome {
     println!("{:?} {:?} {status:?}", host.ticks.period, host.ticks.busy);
     assert_eq!((status.state, status.period_ns), (State::Run, 50_000));
     assert!(host.ticks.begun - begun >= 20_000 && (host.ticks.period.mean() - 8500.0).abs() < 1.0);
-    assert!(host.ticks.busy.max <= 4760, "0.56 of the period: {:?}", host.ticks.busy);
+    assert!(host.ticks.busy.max <= 4250, "half of the period: {:?}", host.ticks.busy);
     assert!(host.ticks.period.spread() <= 255, "{:?}", host.ticks.period);
-    // What is lost on the link is counted. The tick leaves too little time at this rate for telemetry of every tick: two of
-    // three samples and more arrive.
-    // What was lost since the last batch that arrived leaves no gap yet.
-    let uncounted = u64::from(host.telemetry.lost).checked_sub(host.telemetry.missing);
-    assert!(uncounted.is_some_and(|samples| samples <= 250), "{uncounted:?}");
+    // Nothing is lost on the link, or it is counted.
+    assert_eq!(host.telemetry.missing, u64::from(host.telemetry.lost));
     let arrived = host.telemetry.received - received;
     println!("{arrived} of {} samples", host.ticks.begun - begun);
-    assert!(arrived >= 14_000, "{arrived}, lost {:?}", host.telemetry.lost);
+    assert!(arrived >= 19_900, "{arrived}, lost {:?}", host.telemetry.lost);
     Ok(())
 }
