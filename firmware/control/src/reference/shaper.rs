@@ -264,7 +264,7 @@ impl Motion {
     /// Speed, ticks², saturated.
     #[inline]
     fn ticks(speed: i64) -> i32 {
-        saturated(speed >> STATE_BITS).max(-LARGEST).min(LARGEST)
+        saturated(speed >> STATE_BITS).clamp(-LARGEST, LARGEST)
     }
 
     /// Acceleration, 1/16 tick, saturated at twice the longest rise.
