@@ -113,6 +113,11 @@ impl LiveBench {
         self.plant.set_pretension_ratio(ratio);
     }
 
+    /// Pushes the joint from outside with this torque, towards +θ \[Nm\], until it is set anew.
+    pub fn set_outer_torque_nm(&mut self, torque_nm: f64) {
+        self.plant.set_outer_torque_nm(torque_nm);
+    }
+
     /// Moves the sheaths: sets the wrap angle K of cable a and b \[rad\], each bend keeping its share.
     ///
     /// Only the bend angles change: neither the length of a sheath nor what `bending_friction` preloads.
@@ -226,6 +231,26 @@ mod tests {
             bench.step(Bridge::Open);
         }
         assert_eq!(bench.current_a(), 0.0, "no braking current");
+    }
+
+    #[test]
+    fn an_outer_torque_turns_the_joint_by_the_tendons_compliance_and_the_weight() {
+        // Without friction: 2 EA r²/L of the tendons and m g l of the weight, the input pulley held by the short-circuited
+        // motor, which 2 s at 0.4 N·m s/rad let slip by less than 0.1 rad: only the difference of both angles counts.
+        let config = BenchConfig { friction_coefficient: 0.0, ..BenchConfig::default() };
+        let mut bench = LiveBench::new(&config, &[], 1).expect("default bench");
+        bench.set_outer_torque_nm(0.2);
+        for _ in 0..200_000 {
+            bench.step(Bridge::Duty(0.0));
+        }
+        let lag_rad = bench.theta_out_rad() - bench.theta_in_rad();
+        let [_, f2, _, f4] = bench.tensions_n();
+        let stiffness = 2.0 * 72_900.0 * 0.015 * 0.015;
+        let expected_rad = (f4 - f2) * 0.015 / stiffness;
+        assert!(lag_rad > 1e-4 && (lag_rad / expected_rad - 1.0).abs() < 0.02, "{lag_rad} {expected_rad}");
+        let weight_nm = 2.5 * 9.81 * 0.03 * bench.theta_out_rad().sin();
+        let balance_nm = 0.2 - weight_nm - (f4 - f2) * 0.015;
+        assert!(balance_nm.abs() < 2e-3, "{balance_nm} Nm");
     }
 
     #[test]

@@ -105,6 +105,8 @@ pub(crate) struct Plant {
     clock_start_s: f64,
     /// Pretension of cable a and b over that of the configuration \[1\]; 1 unless a live bench is tampered with.
     pretension_ratio: [f64; 2],
+    /// Torque on the arm from outside, towards +θ \[Nm\].
+    outer_nm: f64,
 }
 
 impl Plant {
@@ -159,6 +161,7 @@ impl Plant {
             steps: 0,
             clock_start_s,
             pretension_ratio: [1.0; 2],
+            outer_nm: 0.0,
         };
         plant.update_tensions();
         plant
@@ -198,6 +201,11 @@ impl Plant {
     /// Sets the pretension of cable a and b over that of the configuration \[1\].
     pub(crate) fn set_pretension_ratio(&mut self, ratio: [f64; 2]) {
         self.pretension_ratio = ratio;
+    }
+
+    /// Sets the torque on the arm from outside, towards +θ \[Nm\].
+    pub(crate) fn set_outer_torque_nm(&mut self, torque_nm: f64) {
+        self.outer_nm = torque_nm;
     }
 
     /// Sets the wrap angle K of the sheaths of cable a and b \[rad\]; each bend keeps its share.
@@ -325,6 +333,7 @@ impl Plant {
             effects.joint_viscous_friction.as_ref().map_or(0.0, |law| law.coefficient_nm_s_per_rad);
         let viscous = self.config.joint_viscous_nm_s_per_rad + extra_viscous;
         let mut torque = hub_nm - weight_n * lever_m * arm.angle_rad.sin() - viscous * arm.omega_rad_per_s;
+        torque += self.outer_nm;
         if let Some(law) = &effects.joint_coulomb_friction {
             torque -= law.torque_nm(&mut self.state.joint_coulomb, arm.omega_rad_per_s, dt);
         }
