@@ -8,12 +8,14 @@ use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
 
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
 use crate::correction::lead::{Lead, Led};
+use crate::drive::yielding::YieldInput;
 use crate::drive::{Loops, PositionInput, TorqueInput};
 use crate::encoder::EncoderChannel;
 use crate::encoder::channel::EncoderFault;
 use crate::encoder::stuck::StuckWatch;
+use crate::impedance::ImpedanceInput;
 use crate::observer::{Motion, Observer};
-use crate::reference::{Origin, ReferenceConfig, ReferenceOutput, ReferenceState};
+use crate::reference::{Origin, ReferenceConfig, ReferenceState};
 use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
 use crate::sheath::{Fitted, SheathEstimate, SheathInput, SheathObserver};
 use crate::supervisor::{Detection, Situation, Supervisor};
@@ -245,7 +247,8 @@ impl Controller {
 
     fn drive(&mut self, readings: &Readings, inbox: &mut impl Inbox, limits: &mut Limits) -> Action {
         let homing = self.supervisor.state() == State::Homing;
-        let torque_mode = self.supervisor.mode() == Mode::Torque;
+        let mode = self.supervisor.mode();
+        let torque_mode = mode.follows_torque();
         let mut compensation = CompensatorInput {
             theta_d: readings.theta[1],
             torque_out: readings.sheath.torque_out,
@@ -282,8 +285,20 @@ impl Controller {
             bounds.range
         };
         let reference = self.reference.step(&bounds, window, inbox, limits);
-        let (torque, command) = if torque_mode {
-            (Self::torque(config, &mut self.loops, readings, &reference, limits), readings.theta[0])
+        let rate_sign = reference.change.signum() as i32;
+        let (torque, command) = if torque_mode || mode == Mode::Impedance {
+            let wanted = if torque_mode {
+                Torque::from_bits(reference.value_bits)
+            } else {
+                let joint = ImpedanceInput {
+                    theta_d: Angle::from_bits(reference.value_bits),
+                    omega_d: reference.speed(config.rate_hz),
+                    theta_out: readings.theta[1],
+                    omega_in: readings.motion.speed,
+                };
+                config.impedance.torque(&joint, limits)
+            };
+            (Self::torque(config, &mut self.loops, readings, wanted, rate_sign, limits), readings.theta[0])
         } else {
             compensation.theta_d = Angle::from_bits(reference.value_bits);
             compensation.omega_d = reference.speed(config.rate_hz);
@@ -299,7 +314,10 @@ impl Controller {
                 friction: readings.sheath.friction_torque,
             });
             let (lead, lead_speed) = self.lead.follow(&config.lead, config.joint.stretch(own).plus(leads));
-            let command = compensated.theta_c.plus(lead);
+            let mut command = compensated.theta_c.plus(lead);
+            if mode == Mode::Hybrid {
+                command = config.yielding.command(command, readings.motion.angle);
+            }
             let position = PositionInput {
                 command,
                 command_speed: config.speed_ratio.apply(compensation.omega_d).plus(lead_speed),
@@ -308,7 +326,17 @@ impl Controller {
                 motion: readings.motion,
                 torque_in: readings.load,
             };
-            (self.loops.position(&config.position, &config.drive, &position, limits), command)
+            let mut torque = self.loops.position(&config.position, &config.drive, &position, limits);
+            if mode == Mode::Hybrid {
+                let input = YieldInput {
+                    wanted: torque,
+                    measured: readings.sheath.torque_out,
+                    measured_load: readings.measured_load,
+                    motion: readings.motion,
+                };
+                torque = self.loops.yielding(&config.yielding, &config.torque, &config.drive, &input, limits);
+            }
+            (torque, command)
         };
         let duty_raw = self.loops.duty(&config.drive, torque, readings.motion.speed, readings.bus, limits);
         Action { duty_raw, reference_raw: reference.value_bits, command }
@@ -318,13 +346,13 @@ impl Controller {
         config: &TickConfig,
         loops: &mut Loops,
         readings: &Readings,
-        reference: &ReferenceOutput,
+        wanted: Torque,
+        rate_sign: i32,
         limits: &mut Limits,
     ) -> Torque {
         let theta = readings.theta[1];
-        let rate_sign = reference.change.signum() as i32;
         let direction = loops.direction(&config.torque, &config.drive, rate_sign, readings.motion.speed);
-        let mut wanted = Torque::from_bits(reference.value_bits).plus(config.joint.torque(direction, theta));
+        let mut wanted = wanted.plus(config.joint.torque(direction, theta));
         // What a correction adds does not push a free joint out of its range either.
         let [low, high] = config.angle_bounds.range.map(Angle::from_bits);
         if (theta > high && wanted > Torque::ZERO) || (theta < low && wanted < Torque::ZERO) {

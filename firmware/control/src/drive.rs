@@ -16,6 +16,8 @@
 //! The integral rests (flag [`Limit::Integrator`]) while current or duty are at their limit and the error would push
 //! further, and while the count does not tell an error.
 
+pub mod yielding;
+
 use bowden_link::{Limit, Limits};
 
 use crate::correction::MotorCorrection;
@@ -107,6 +109,8 @@ pub struct Loops {
     direction_target: Share,
     /// Sign of the output that was at a limit in the last tick, 0 if none was.
     saturated: i8,
+    /// Sign of what the limit of the output torque took off in this tick.
+    yields: i8,
 }
 
 /// What the position loop follows and sees.
@@ -168,7 +172,8 @@ impl Loops {
     ) -> Torque {
         let error = input.command.minus(input.motion.angle);
         let told = !input.command.minus(input.measured).is_at_most(config.half_count);
-        if told && self.may_integrate(error.to_bits(), limits) {
+        let yields = i32::from(self.yields) * error.to_bits().signum() > 0;
+        if told && !yields && self.may_integrate(error.to_bits(), limits) {
             self.acceleration.add(config.integral, error);
         }
         let wanted = config.acceleration_feedforward.apply(input.acceleration);

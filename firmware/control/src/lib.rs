@@ -29,6 +29,7 @@ pub mod controller;
 pub mod correction;
 pub mod drive;
 pub mod encoder;
+pub mod impedance;
 pub mod observer;
 pub mod parameters;
 pub mod reference;

@@ -17,8 +17,8 @@ pub use corrections::{
     SheathFrictionParameters,
 };
 pub use groups::{
-    Bounds, Bridge, Compensation, Control, Encoder, Encoders, Load, Loops, Motor, Pulleys, References,
-    Sheath, Supervision, Tendon, TensionChannel, Tensions,
+    Bounds, Bridge, Compensation, Control, Encoder, Encoders, Impedance, Load, Loops, Motor, Pulleys,
+    References, Sheath, Supervision, Tendon, TensionChannel, Tensions,
 };
 
 pub use reach::Reach;
@@ -83,6 +83,8 @@ pub struct Parameters {
     pub supervisor: Supervision,
     /// What a diagnosis found beyond the nominal joint.
     pub correction: Corrections,
+    /// Impedance mode.
+    pub impedance: Impedance,
 }
 
 macro_rules! parameter_table {
@@ -124,6 +126,7 @@ impl Default for Parameters {
             limits: Bounds::default(),
             supervisor: Supervision::default(),
             correction: Corrections::default(),
+            impedance: Impedance::default(),
         };
         for specification in table::SPECIFICATIONS {
             *(specification.place)(&mut parameters) = specification.default;

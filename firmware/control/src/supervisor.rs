@@ -114,6 +114,8 @@ enum Mode2 {
     #[default]
     Position,
     Torque,
+    Hybrid,
+    Impedance,
 }
 
 /// What the supervisor looks at.
@@ -146,6 +148,8 @@ impl Supervisor {
         match self.mode {
             Mode2::Position => Mode::Position,
             Mode2::Torque => Mode::Torque,
+            Mode2::Hybrid => Mode::Hybrid,
+            Mode2::Impedance => Mode::Impedance,
         }
     }
 
@@ -190,6 +194,8 @@ impl Supervisor {
                 self.mode = match mode {
                     Mode::Position => Mode2::Position,
                     Mode::Torque => Mode2::Torque,
+                    Mode::Hybrid => Mode2::Hybrid,
+                    Mode::Impedance => Mode2::Impedance,
                 };
                 State::Run
             }

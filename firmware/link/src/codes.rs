@@ -210,11 +210,13 @@ pub enum Limit {
     MagnetMarginal = 1 << 8,
     /// The acceleration or the jerk of the reference is limited.
     ReferenceAcceleration = 1 << 9,
+    /// The output torque is held at the limit of the modes that yield.
+    OutputTorque = 1 << 10,
 }
 
 impl Limit {
     /// Every limit.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Duty,
         Self::Current,
         Self::ReferenceSpeed,
@@ -225,6 +227,7 @@ impl Limit {
         Self::FrameRepaired,
         Self::MagnetMarginal,
         Self::ReferenceAcceleration,
+        Self::OutputTorque,
     ];
 
     /// In words.
@@ -241,6 +244,7 @@ impl Limit {
             Self::FrameRepaired => "encoder frame repaired",
             Self::MagnetMarginal => "encoder magnet marginal",
             Self::ReferenceAcceleration => "reference acceleration limited",
+            Self::OutputTorque => "output torque at its limit",
         }
     }
 }

@@ -188,6 +188,19 @@ pub enum Mode {
     Position,
     /// Torque at the joint, N·m.
     Torque,
+    /// Angle of the joint, rad; yields where this takes more output torque than the parameter `limits.contact_torque`.
+    Hybrid,
+    /// Angle of the joint, rad, towards which it is pulled with the parameters `impedance.stiffness` and
+    /// `impedance.damping`.
+    Impedance,
+}
+
+impl Mode {
+    /// Whether the reference is a torque, N·m; otherwise it is an angle, rad.
+    #[must_use]
+    pub const fn follows_torque(self) -> bool {
+        matches!(self, Self::Torque)
+    }
 }
 
 /// Where the reference comes from. Values are rad or N·m, after the [`Mode`].

@@ -147,7 +147,7 @@ impl Conversion {
 /// of the reference is not known, and only its raw value is there.
 pub fn columns(mode: Option<Mode>) -> Vec<RowColumn> {
     let reference = mode.map(|mode| match mode {
-        Mode::Position => RowColumn::Known(Channel::ThetaRef),
+        Mode::Position | Mode::Hybrid | Mode::Impedance => RowColumn::Known(Channel::ThetaRef),
         Mode::Torque => RowColumn::described(TORQUE_REFERENCE, "N m"),
     });
     let roles = [

@@ -19,6 +19,10 @@ pub enum ModeName {
     Position,
     /// Torque at the joint, N·m
     Torque,
+    /// Angle of the joint, rad, yielding beyond limits.contact_torque
+    Hybrid,
+    /// Angle of the joint, rad, as a spring and damper: impedance.stiffness, impedance.damping
+    Impedance,
 }
 
 impl From<ModeName> for Mode {
@@ -26,6 +30,8 @@ impl From<ModeName> for Mode {
         match name {
             ModeName::Position => Self::Position,
             ModeName::Torque => Self::Torque,
+            ModeName::Hybrid => Self::Hybrid,
+            ModeName::Impedance => Self::Impedance,
         }
     }
 }
@@ -33,7 +39,7 @@ impl From<ModeName> for Mode {
 /// Arguments that say what the joint is to follow.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CourseArguments {
-    /// What is controlled; amplitude and offset are in rad or N·m accordingly
+    /// What is controlled; amplitude and offset are in rad, in torque mode in N·m
     #[arg(long, value_enum, default_value = "position")]
     mode: ModeName,
     /// hold (at the offset), sine, triangle, multisine, staircase, or a recording with `theta_ref_rad` (`torque_ref_nm`
@@ -122,10 +128,7 @@ impl CourseArguments {
     /// # Errors
     /// One line with what can be done.
     pub fn check(&self, course: &Course, parameters: &Parameters) -> Result<(), Failure> {
-        let unit = match self.mode {
-            ModeName::Position => "rad",
-            ModeName::Torque => "N·m",
-        };
+        let unit = if self.mode().follows_torque() { "N·m" } else { "rad" };
         match course {
             Course::OnBoard(reference) => {
                 let Err(no) = check_reference(parameters, self.mode(), *reference) else { return Ok(()) };
@@ -142,14 +145,18 @@ impl CourseArguments {
                     Quantity::Frequency => format!(
                         "--frequency {got}: the board can do {minimum} to {maximum} Hz; choose one within it"
                     ),
+                    Quantity::Stiffness => format!(
+                        "impedance.stiffness {got}: the tendons can do {maximum} N·m/rad at most; lower it with `bowden params set`"
+                    ),
+                    Quantity::Damping => format!(
+                        "impedance.damping {got}: the motor can do {maximum} N·m·s/rad at most; lower it with `bowden params set`"
+                    ),
                 }))
             }
             Course::Streamed(track) => {
-                let reach = Reach::new(parameters);
-                let [minimum, maximum] = match self.mode {
-                    ModeName::Position => reach.angle,
-                    ModeName::Torque => [-reach.torque, reach.torque],
-                };
+                let reach = Reach::of(parameters, self.mode());
+                let [minimum, maximum] =
+                    if self.mode().follows_torque() { [-reach.torque, reach.torque] } else { reach.angle };
                 let Some((t_s, got)) = track.first_outside(minimum.into(), maximum.into()) else {
                     return Ok(());
                 };
@@ -204,7 +211,7 @@ impl Track {
             ))
         };
         let values = match mode {
-            Mode::Position => {
+            Mode::Position | Mode::Hybrid | Mode::Impedance => {
                 let column = Channel::ThetaRef;
                 recording.channel(column).ok_or_else(|| missing(column.role()))?.to_vec()
             }

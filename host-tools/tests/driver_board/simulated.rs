@@ -155,6 +155,23 @@ fn a_torque_run_records_the_torque_that_was_asked_for() {
     assert_eq!(recording.channel(Channel::ThetaRef), None);
 }
 
+/// Columns and motion of position mode: 0.2 rad of the free joint, within what its spring of 2 N·m/rad leaves of 0.03 N·m.
+#[test]
+fn the_modes_that_yield_record_the_angle_that_was_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    for (mode, off_rad) in [("hybrid", 0.005), ("impedance", 0.015)] {
+        let arguments = ["record", "--port", "sim", "--home", "--out", "a.csv", "--seconds", "1.5"];
+        let arguments = [&arguments[..], &["--every", "10", "--mode", mode, "--offset", "0.2"]].concat();
+        let (status, _, stderr) = bowden(folder.path(), &arguments);
+        assert_eq!((status, stderr.as_str()), (0, ""));
+        let recording = Recording::load(&folder.path().join("a.csv"), &ReadOptions::default()).unwrap();
+        let last = |channel| *recording.channel(channel).unwrap().last().unwrap();
+        assert!((last(Channel::ThetaRef) - 0.2).abs() < 1e-5, "{mode}: {}", last(Channel::ThetaRef));
+        assert!((last(Channel::ThetaOut) - 0.2).abs() < off_rad, "{mode}: {}", last(Channel::ThetaOut));
+        fs::remove_file(folder.path().join("a.csv")).unwrap();
+    }
+}
+
 #[test]
 fn the_boards_own_services_take_repeated_points_once() {
     let wire = Lossy::new(SimTransport::new(), 2);
@@ -255,6 +272,8 @@ fn every_form_runs_at_the_default_amplitude() {
 fn what_the_joint_cannot_do_is_refused_in_one_line_before_anything_moves() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("ref.csv"), "t_s,theta_ref_rad\n0,0\n0.5,0.4\n1,1.5\n").unwrap();
+    let soft = "schema = \"bowden-parameters/1\"\nlimits.contact_torque = 0.2\nimpedance.stiffness = 20.0\n";
+    fs::write(folder.path().join("soft.toml"), soft).unwrap();
     for (arguments, expected) in [
         (
             vec!["sine", "--amplitude", "99"],
@@ -278,6 +297,14 @@ fn what_the_joint_cannot_do_is_refused_in_one_line_before_anything_moves() {
             "--offset 0.9: the joint can do -0.5935 to 0.5935 N·m; choose",
         ),
         (
+            vec!["hold", "--mode", "hybrid", "--offset", "0.5", "--parameters", "soft.toml"],
+            "--offset 0.5: the joint can do -0.2612 to 0.2612 rad; choose a value within it",
+        ),
+        (
+            vec!["hold", "--mode", "impedance", "--parameters", "soft.toml"],
+            "impedance.stiffness 20: the tendons can do 16.4 N·m/rad at most; lower it with `bowden params set`",
+        ),
+        (
             vec!["ref.csv"],
             "--reference ref.csv: 1.5 rad at 1 s, the joint can do -0.8731 to 0.8731 rad; scale the reference",
         ),
@@ -292,7 +319,7 @@ fn what_the_joint_cannot_do_is_refused_in_one_line_before_anything_moves() {
         assert!(stderr.starts_with(&format!("bowden: {expected}")), "{arguments:?}: {stderr}");
         assert_eq!(stderr.lines().count(), 1);
     }
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
 #[test]

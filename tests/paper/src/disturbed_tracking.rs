@@ -156,7 +156,7 @@ pub fn track(
     let mut joint = DrivenJoint::ready(&bench, method.parameters.clone(), seed)?;
     let motion = SheathMotion::new(setup.sheath, seed);
     joint.refer(match method.mode {
-        Mode::Position => Reference::Generated {
+        Mode::Position | Mode::Hybrid | Mode::Impedance => Reference::Generated {
             shape: Shape::Sine,
             amplitude: setup.amplitude_rad as f32,
             offset: 0.0,

@@ -159,6 +159,21 @@ impl DrivenJoint {
         self.queues.commands.push_back(Command::Enter(goal));
     }
 
+    /// Pushes the joint from outside, towards +θ \[Nm\], until it is set anew.
+    pub fn push(&mut self, torque_nm: f64) {
+        self.bench.set_outer_torque_nm(torque_nm);
+    }
+
+    /// Changes the parameters of the controller, also while the joint moves.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Parameters`] if they do not fit together.
+    pub fn configure(&mut self, parameters: Parameters) -> Result<(), ExperimentError> {
+        self.queues.commands.push_back(Command::Configure(tick_config(&parameters)?));
+        self.parameters = parameters;
+        Ok(())
+    }
+
     /// Gives a reference to the controller.
     ///
     /// # Errors

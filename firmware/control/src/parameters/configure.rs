@@ -13,10 +13,12 @@ use crate::correction::dead_zone::DeadZone;
 use crate::correction::eccentricity::Eccentricity;
 use crate::correction::joint::JointCorrection;
 use crate::correction::lead::{LeadConfig, Leads};
+use crate::drive::yielding::YieldConfig;
 use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::encoder::multi_turn::StepLimit;
 use crate::encoder::stuck::StuckConfig;
 use crate::encoder::{CountRaw, EncoderConfig};
+use crate::impedance::ImpedanceConfig;
 use crate::observer::ObserverConfig;
 use crate::reference::shaper::ShaperLimits;
 use crate::reference::{Origin, ReferenceBounds, TorqueWindow};
@@ -56,6 +58,8 @@ pub struct TickConfig {
     pub(crate) joint: JointCorrection,
     pub(crate) lead: LeadConfig,
     pub(crate) leads: Leads,
+    pub(crate) yielding: YieldConfig,
+    pub(crate) impedance: ImpedanceConfig,
 }
 
 impl TickConfig {
@@ -87,6 +91,8 @@ impl TickConfig {
             joint: joint_correction,
             lead,
             leads,
+            yielding,
+            impedance,
         } = other;
         self.rate_hz = *rate_hz;
         self.encoder[0] = *input;
@@ -112,6 +118,8 @@ impl TickConfig {
         self.joint = *joint_correction;
         self.lead = *lead;
         self.leads = *leads;
+        self.yielding = *yielding;
+        self.impedance = *impedance;
     }
 }
 
@@ -177,6 +185,8 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         joint: JointCorrection::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
         leads: Leads::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
         lead: LeadConfig::new(parameters).ok_or_else(|| conflict("compensator.rate_limit"))?,
+        yielding: YieldConfig::new(parameters),
+        impedance: ImpedanceConfig::new(parameters).ok_or_else(|| conflict("impedance.stiffness"))?,
     })
 }
 

@@ -209,6 +209,19 @@ pub struct Bounds {
     pub torque_rate: f32,
     /// Motor current that is never asked for, A.
     pub current: f32,
+    /// Output torque that the hybrid and the impedance mode stay within, N·m; [`super::Reach`] may be lower.
+    pub contact_torque: f32,
+}
+
+/// Impedance mode.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Impedance {
+    /// Torque that pulls the joint to its reference an angle, N·m/rad.
+    pub stiffness: f32,
+    /// Torque that damps it a speed, N·m·s/rad.
+    pub damping: f32,
+    /// Part of the load's weight that is carried.
+    pub gravity: f32,
 }
 
 /// Supervisor.

@@ -15,6 +15,7 @@
 //! The part [`DYNAMIC_SHARE`] of what gravity leaves is planned with; the rest is for what the loop and the tendons'
 //! oscillation add.
 
+use bowden_link::message::Mode;
 use libm::{expf, expm1f, sinf, sqrtf};
 
 use super::Parameters;
@@ -31,6 +32,8 @@ const STATIC_SHARE: f32 = 0.95;
 const MOTOR_SHARE: f32 = 0.9;
 /// Time in which the acceleration may rise, in units of the inverse of the natural frequency of load and tendons.
 const RISE: f32 = 4.0;
+/// Part of the stiffness of both tendons that the impedance mode may ask for.
+const STIFFNESS_SHARE: f32 = 0.5;
 /// Time in which the rate of a torque may rise, s.
 const TORQUE_RISE_S: f32 = 0.02;
 
@@ -57,19 +60,43 @@ pub struct Reach {
     pub torque_acceleration: f32,
     /// Largest change of that, N·m/s³.
     pub torque_jerk: f32,
+    /// Largest stiffness of the impedance mode, N·m/rad.
+    pub stiffness: f32,
+    /// Largest damping of the impedance mode, N·m·s/rad.
+    pub damping: f32,
 }
 
 impl Reach {
     /// The reach of a joint with these parameters.
     #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
+        Self::in_mode(parameters, false)
+    }
+
+    /// The reach in a mode that keeps the output torque within `limits.contact_torque`.
+    #[must_use]
+    pub fn yielding(parameters: &Parameters) -> Self {
+        Self::in_mode(parameters, true)
+    }
+
+    /// The reach in this mode.
+    #[must_use]
+    pub fn of(parameters: &Parameters, mode: Mode) -> Self {
+        match mode {
+            Mode::Position | Mode::Torque => Self::new(parameters),
+            Mode::Hybrid | Mode::Impedance => Self::yielding(parameters),
+        }
+    }
+
+    fn in_mode(parameters: &Parameters, yields: bool) -> Self {
         let limits = &parameters.limits;
         let ratio = parameters.pulley.output_radius / parameters.pulley.input_radius;
         let load = &parameters.load;
         let inertia = load.mass * load.arm * load.arm + load.inertia;
         let weight = load.mass * GRAVITY_M_S2 * load.arm;
         let motor = Motor::new(parameters, ratio);
-        let torque = tendon_torque(parameters).min(motor.output_torque).max(0.0);
+        let bearable = tendon_torque(parameters).min(motor.output_torque).max(0.0);
+        let torque = if yields { bearable.min(limits.contact_torque) } else { bearable };
 
         let speed = limits.speed.min(motor.speed).min(0.5 * parameters.encoder.speed_limit / ratio.max(1.0));
         let most = limits.acceleration.min(motor.acceleration(torque, speed));
@@ -78,7 +105,8 @@ impl Reach {
         let raised = per_inertia(DYNAMIC_SHARE * (torque - weight)).min(acceleration);
         let stiffness = 2.0 * parameters.tendon.axial_stiffness / parameters.tendon.length;
         let radius = parameters.pulley.output_radius;
-        let natural = sqrtf(per_inertia(stiffness * radius * radius));
+        let stiffness = stiffness * radius * radius;
+        let natural = sqrtf(per_inertia(stiffness));
         let held = STATIC_SHARE * torque;
         let end = if weight > held { libm::asinf(held / weight) } else { f32::MAX };
         let rate = limits.torque_rate;
@@ -88,11 +116,13 @@ impl Reach {
             acceleration,
             gravity: acceleration - raised,
             jerk: limits.jerk.min(acceleration * natural / RISE),
-            torque: limits.torque.min(torque),
+            torque: if yields { torque } else { limits.torque.min(torque) },
             weight,
             torque_rate: rate,
             torque_acceleration: rate / TORQUE_RISE_S,
             torque_jerk: rate / (TORQUE_RISE_S * TORQUE_RISE_S),
+            stiffness: STIFFNESS_SHARE * stiffness,
+            damping: motor.damping(parameters, ratio),
         }
     }
 
@@ -143,6 +173,13 @@ struct Motor {
 }
 
 impl Motor {
+    /// Damping at the joint with which the rotor slows down as fast as the observer follows it, N·m·s/rad.
+    fn damping(&self, parameters: &Parameters, ratio: f32) -> f32 {
+        let controller = &parameters.controller;
+        let observer = core::f32::consts::TAU * controller.observer_bandwidth;
+        self.inertia * ratio * observer / (1.0 + controller.torque_gain)
+    }
+
     fn new(parameters: &Parameters, ratio: f32) -> Self {
         /// Part of the least voltage that the winding's resistance may take.
         const RESISTIVE_SHARE: f32 = 0.8;

@@ -27,6 +27,10 @@ pub enum Quantity {
     Offset,
     /// Frequency.
     Frequency,
+    /// Stiffness of the impedance mode, whatever the reference.
+    Stiffness,
+    /// Damping of the impedance mode, whatever the reference.
+    Damping,
 }
 
 /// A reference that the joint cannot do.
@@ -64,13 +68,16 @@ struct Limits {
 /// [`Unreachable`] names the number that cannot be done, and what can: first a frequency beyond what the ticks resolve, then
 /// an offset, then the amplitude.
 pub fn check_reference(parameters: &Parameters, mode: Mode, reference: Reference) -> Result<(), Unreachable> {
-    let reach = Reach::new(parameters);
-    let limits = match mode {
-        Mode::Position => Limits { range: reach.angle, speed: reach.speed, jerk: reach.jerk, reach, mode },
-        Mode::Torque => {
-            let range = [-reach.torque, reach.torque];
-            Limits { range, speed: reach.torque_rate, jerk: reach.torque_jerk, reach, mode }
-        }
+    let reach = Reach::of(parameters, mode);
+    if mode == Mode::Impedance {
+        within(Quantity::Stiffness, parameters.impedance.stiffness, 0.0, reach.stiffness)?;
+        within(Quantity::Damping, parameters.impedance.damping, 0.0, reach.damping)?;
+    }
+    let limits = if mode.follows_torque() {
+        let range = [-reach.torque, reach.torque];
+        Limits { range, speed: reach.torque_rate, jerk: reach.torque_jerk, reach, mode }
+    } else {
+        Limits { range: reach.angle, speed: reach.speed, jerk: reach.jerk, reach, mode }
     };
     let [low, high] = limits.range;
     match reference {
@@ -120,8 +127,8 @@ impl Limits {
             Shape::Staircase => (0.25 * amplitude, 1.0 / 16.0, offset.abs() + 0.875 * amplitude),
         };
         let acceleration = match self.mode {
-            Mode::Position => self.reach.outward(middle),
             Mode::Torque => self.reach.torque_acceleration,
+            Mode::Position | Mode::Hybrid | Mode::Impedance => self.reach.outward(middle),
         };
         let time_s = shortest_move(distance, self.speed, acceleration.max(0.0), self.jerk);
         time_s <= TIME_SHARE * part / frequency_hz
@@ -186,6 +193,23 @@ mod tests {
         let no = check_reference(&parameters, Mode::Position, sine(0.5, 0.6, 0.1)).unwrap_err();
         assert!((no.maximum - (Reach::new(&parameters).angle[1] - 0.6)).abs() < 1e-6, "{no:?}");
         assert_eq!(check_reference(&parameters, Mode::Position, sine(no.maximum, 0.6, 0.1)), Ok(()));
+        // A mode that yields carries the weight within its limit: 0.735 75 N·m sin θ = 0.95·0.2 N·m.
+        let mut yielding = parameters.clone();
+        yielding.limits.contact_torque = 0.2;
+        for mode in [Mode::Hybrid, Mode::Impedance] {
+            let no = check_reference(&yielding, mode, Reference::Hold(0.5)).unwrap_err();
+            assert!(no.quantity == Quantity::Value && (no.maximum - 0.2612).abs() < 1e-3, "{no:?}");
+        }
+        assert_eq!(check_reference(&yielding, Mode::Position, Reference::Hold(0.5)), Ok(()));
+        for (stiffness, damping, quantity) in
+            [(17.0, 0.1, Quantity::Stiffness), (16.0, 0.2, Quantity::Damping)]
+        {
+            yielding.impedance.stiffness = stiffness;
+            yielding.impedance.damping = damping;
+            let no = check_reference(&yielding, Mode::Impedance, Reference::Hold(0.0)).unwrap_err();
+            assert_eq!(no.quantity, quantity);
+            assert_eq!(check_reference(&yielding, Mode::Hybrid, Reference::Hold(0.0)), Ok(()));
+        }
         // Less and less with the frequency, and never nothing.
         let largest =
             |hz| check_reference(&parameters, Mode::Position, sine(9.0, 0.0, hz)).unwrap_err().maximum;

@@ -149,4 +149,8 @@ parameter_table! {
     correction.joint_encoder.amplitude, "rad", -0.2, 0.2, 0.0, true;
     correction.joint_encoder.phase, "rad", -3.15, 3.15, 0.0, true;
     correction.joint_encoder.limit, "rad", 0.0, 0.2, 0.05, true;
+    limits.contact_torque, "N·m", 0.001, 1000.0, 0.6, true;
+    impedance.stiffness, "N·m/rad", 0.0, 10_000.0, 2.0, true;
+    impedance.damping, "N·m·s/rad", 0.0, 1000.0, 0.05, true;
+    impedance.gravity, "", 0.0, 1.2, 1.0, true;
 }

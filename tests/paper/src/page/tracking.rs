@@ -120,7 +120,7 @@ fn row(load: &PaperLoad, errors: &MethodErrors) -> Result<Vec<String>, String> {
         Mode::Position => {
             format!("{:.1} %", predicted_percent(load, method.parameters.compensator.source > 0.0)?)
         }
-        Mode::Torque => String::new(),
+        Mode::Torque | Mode::Hybrid | Mode::Impedance => String::new(),
     };
     let torque = errors.torque_percent;
     Ok(vec![
