@@ -355,8 +355,9 @@ impl World {
         let goal = match controller.state() {
             State::Off => Goal::Ready,
             State::Ready if random.rarely(3) => Goal::Home,
-            State::Ready if random.rarely(2) => Goal::Run(Mode::Torque),
-            State::Ready => Goal::Run(Mode::Position),
+            State::Ready => Goal::Run(
+                [Mode::Position, Mode::Torque, Mode::Hybrid, Mode::Impedance][random.below(4) as usize],
+            ),
             State::Fault => Goal::ClearFault,
             State::SelfTest | State::PretensionCheck | State::Homing | State::Run => {
                 return match random.below(40) {
