@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use bowden_control::parameters::{Parameters, Quantity, Reach, check_reference};
+use bowden_control::parameters::{Parameters, Quantity, Reach, Unreachable, check_reference};
 use bowden_link::message::{Mode, Reference, Shape};
 use bowden_model::channel::Channel;
 
@@ -129,44 +129,53 @@ impl CourseArguments {
     /// One line with what can be done.
     pub fn check(&self, course: &Course, parameters: &Parameters) -> Result<(), Failure> {
         let unit = if self.mode().follows_torque() { "N·m" } else { "rad" };
-        match course {
-            Course::OnBoard(reference) => {
-                let Err(no) = check_reference(parameters, self.mode(), *reference) else { return Ok(()) };
-                let (got, minimum, maximum) = (no.got, rounded(no.minimum), rounded(no.maximum));
-                Err(Failure::bad_input(match no.quantity {
-                    Quantity::Amplitude => format!(
-                        "--amplitude {got}: the joint can do {maximum} {unit} at most at {} Hz around {} {unit}; lower it or \
-                         the frequency",
-                        self.frequency, self.offset
-                    ),
-                    Quantity::Offset | Quantity::Value => format!(
-                        "--offset {got}: the joint can do {minimum} to {maximum} {unit}; choose a value within it"
-                    ),
-                    Quantity::Frequency => format!(
-                        "--frequency {got}: the board can do {minimum} to {maximum} Hz; choose one within it"
-                    ),
-                    Quantity::Stiffness => format!(
-                        "impedance.stiffness {got}: the tendons can do {maximum} N·m/rad at most; lower it with `bowden params set`"
-                    ),
-                    Quantity::Damping => format!(
-                        "impedance.damping {got}: the motor can do {maximum} N·m·s/rad at most; lower it with `bowden params set`"
-                    ),
-                }))
+        let reference = match course {
+            Course::OnBoard(reference) => *reference,
+            Course::Streamed(_) => Reference::Stream,
+        };
+        if let Err(no) = check_reference(parameters, self.mode(), reference) {
+            return Err(Failure::bad_input(self.refused(&no, unit)));
+        }
+        let Course::Streamed(track) = course else { return Ok(()) };
+        let reach = Reach::of(parameters, self.mode());
+        let [minimum, maximum] =
+            if self.mode().follows_torque() { [-reach.torque, reach.torque] } else { reach.angle };
+        let Some((t_s, got)) = track.first_outside(minimum.into(), maximum.into()) else {
+            return Ok(());
+        };
+        Err(Failure::bad_input(format!(
+            "--reference {}: {got} {unit} at {t_s} s, the joint can do {} to {} {unit}; scale the reference",
+            self.reference.display(),
+            rounded(minimum),
+            rounded(maximum)
+        )))
+    }
+
+    /// One line on what the joint cannot do, and what it can.
+    fn refused(&self, no: &Unreachable, unit: &str) -> String {
+        let (got, minimum, maximum) = (no.got, rounded(no.minimum), rounded(no.maximum));
+        match no.quantity {
+            Quantity::Amplitude => format!(
+                "--amplitude {got}: the joint can do {maximum} {unit} at most at {} Hz around {} {unit}; lower it or \
+                 the frequency",
+                self.frequency, self.offset
+            ),
+            Quantity::Offset | Quantity::Value => {
+                format!(
+                    "--offset {got}: the joint can do {minimum} to {maximum} {unit}; choose a value within it"
+                )
             }
-            Course::Streamed(track) => {
-                let reach = Reach::of(parameters, self.mode());
-                let [minimum, maximum] =
-                    if self.mode().follows_torque() { [-reach.torque, reach.torque] } else { reach.angle };
-                let Some((t_s, got)) = track.first_outside(minimum.into(), maximum.into()) else {
-                    return Ok(());
-                };
-                Err(Failure::bad_input(format!(
-                    "--reference {}: {got} {unit} at {t_s} s, the joint can do {} to {} {unit}; scale the reference",
-                    self.reference.display(),
-                    rounded(minimum),
-                    rounded(maximum)
-                )))
+            Quantity::Frequency => {
+                format!("--frequency {got}: the board can do {minimum} to {maximum} Hz; choose one within it")
             }
+            Quantity::Stiffness => format!(
+                "impedance.stiffness {got}: the tendons can do {maximum} N·m/rad at most; lower it with \
+                 `bowden params set`"
+            ),
+            Quantity::Damping => format!(
+                "impedance.damping {got}: the motor can do {maximum} N·m·s/rad at most; lower it with \
+                 `bowden params set`"
+            ),
         }
     }
 }

@@ -298,10 +298,14 @@ fn what_the_joint_cannot_do_is_refused_in_one_line_before_anything_moves() {
         ),
         (
             vec!["hold", "--mode", "hybrid", "--offset", "0.5", "--parameters", "soft.toml"],
-            "--offset 0.5: the joint can do -0.2612 to 0.2612 rad; choose a value within it",
+            "--offset 0.5: the joint can do -0.2611 to 0.2611 rad; choose a value within it",
         ),
         (
             vec!["hold", "--mode", "impedance", "--parameters", "soft.toml"],
+            "impedance.stiffness 20: the tendons can do 16.4 N·m/rad at most; lower it with `bowden params set`",
+        ),
+        (
+            vec!["ref.csv", "--mode", "impedance", "--parameters", "soft.toml"],
             "impedance.stiffness 20: the tendons can do 16.4 N·m/rad at most; lower it with `bowden params set`",
         ),
         (
