@@ -16,6 +16,8 @@
 //! | [`tracking_error`] | average torque tracking error, position error |
 //! | [`disturbed_tracking`] | section 5.2, Fig. 11 and 12: setup and runner |
 //! | [`beyond`] | the same with a controller that follows the friction of the sheaths |
+//! | [`position`] | position mode while the sheaths are moved: frequencies, loads, pretensions, wrong parameters |
+//! | [`wrap_step`] | torque error after a step of the wrap angle |
 //! | [`tracking_methods`] | the ways to control the joint that are compared there |
 //! | [`tracking_prediction`] | what the equations make of it |
 //! | [`alternative_arms`] | other constants that fit there |
@@ -33,8 +35,10 @@ pub mod loop_run;
 pub mod lubrication_and_radius;
 pub mod page;
 pub mod plots;
+pub mod position;
 pub mod sheath_motion;
 pub mod torque_phases;
 pub mod tracking_error;
 pub mod tracking_methods;
 pub mod tracking_prediction;
+pub mod wrap_step;

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use bowden_paper::error::ExperimentError;
 use bowden_paper::page::{self, Section};
@@ -20,10 +21,30 @@ struct Options {
     /// Date and commit that the page names
     #[arg(long, value_name = "TEXT", default_value = "date and commit not given")]
     provenance: String,
-    /// Instead, track with the controller that follows the friction of the sheaths, over this many of their motions; the
-    /// page goes beside the other as tracking.md
-    #[arg(long, value_name = "SEEDS", num_args = 0..=1, default_missing_value = "50")]
-    beyond: Option<u64>,
+    /// Instead, track with the controller that follows the friction of the sheaths, over this many of their motions, and in
+    /// position mode; the page goes beside the other as tracking.md. `position`: the sections on position mode alone
+    #[arg(long, value_name = "SEEDS|position", num_args = 0..=1, default_missing_value = "50")]
+    beyond: Option<Beyond>,
+}
+
+/// Which part of the page is written.
+#[derive(Clone, Copy, Debug)]
+enum Beyond {
+    /// All of it, torque with so many seeds.
+    Seeds(u64),
+    /// The sections on position mode.
+    Position,
+}
+
+impl FromStr for Beyond {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "position" {
+            return Ok(Self::Position);
+        }
+        text.parse().map(Self::Seeds).map_err(|_| "expected a number of seeds, or position".to_owned())
+    }
 }
 
 fn main() -> ExitCode {
@@ -38,11 +59,19 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), String> {
     let told = |error: ExperimentError| error.to_string();
-    if let Some(seeds) = options.beyond {
-        let table = beyond::table(seeds).map_err(told)?;
-        println!("{table}");
-        if let Some(path) = options.page.as_ref().map(|page| page.with_file_name("tracking.md")) {
-            page::write_tracking(&table, &options.provenance, &path)?;
+    if let Some(part) = options.beyond {
+        let path = options.page.as_ref().map(|page| page.with_file_name("tracking.md"));
+        if let Beyond::Seeds(seeds) = part {
+            let table = beyond::table(seeds).map_err(told)?;
+            println!("{table}");
+            if let Some(path) = &path {
+                page::write_tracking(&table, &options.provenance, path)?;
+            }
+        }
+        let sections = page::position::sections(&options.provenance).map_err(told)?;
+        println!("{sections}");
+        if let Some(path) = &path {
+            page::position::replace(&sections, path)?;
             println!("{}", path.display());
         }
         return Ok(());

@@ -2,6 +2,7 @@
 
 pub mod gaps;
 pub mod lift;
+pub mod position;
 pub mod segments;
 pub mod tracking;
 
