@@ -21,7 +21,9 @@
 //! When a cable slips. Friction never exceeds its limit, so a difference above the present `q` proves that `q` is too small,
 //! whatever the cable does. A difference below it says that `q` is too large only where the cable slips: at an end of the dead
 //! zone, a play of the input pulley as wide as the present `q` says and a fifth more. A `q` that is too large makes the zone
-//! wider, one that is too small is raised, so both settle at the truth.
+//! wider, one that is too small is raised, so both settle at the truth. A joint that goes more than a count the way that the
+//! pulley goes proves slip too, however wide the zone was thought to be: friction that fell while the zone was crossed is
+//! known a count later.
 //!
 //! How much a tick counts is a scalar Kalman filter: the variance of `q` grows with time, faster while innovations stay on
 //! one side (the sheath is being moved), and shrinks with each tick of slip. A variance above [`SheathConfig::known_below`]
@@ -76,6 +78,8 @@ pub struct SheathConfig {
     pub zone: Gain<Ratio, Angle>,
     /// Half of the play of transmission and joint that is known, which the dead zone is wider by.
     pub play: Angle,
+    /// A count of the joint's encoder and half of the joint's known play: a joint that moves less may stand.
+    pub joint_play: Angle,
     /// `F0 L/(EA r1)`: half of the dead zone at the input pulley, per `q`.
     pub half_zone: Gain<Ratio, Angle>,
     /// `r2/r1`: angle of the joint at the input pulley.
@@ -188,7 +192,7 @@ impl Follower {
     }
 }
 
-/// Where the input pulley stands within the dead zone: a play that it drags along.
+/// A play that an angle drags along: where the input pulley stands within the dead zone, or whether the joint moves.
 #[derive(Clone, Copy, Debug, Default)]
 struct Zone {
     middle: Angle,
@@ -196,7 +200,11 @@ struct Zone {
 }
 
 impl Zone {
-    /// Follows the pulley. Cables slip while it drags the zone: not while a narrower zone comes to a pulley that turns back.
+    fn around(angle: Angle) -> Self {
+        Self { middle: angle, last: angle }
+    }
+
+    /// Follows the angle. Cables slip while it drags the zone: not while a narrower zone comes to a pulley that turns back.
     #[inline]
     fn step(&mut self, angle: Angle, half_width: Angle) -> Slip {
         let (low, high) = (angle.minus(half_width), angle.plus(half_width));
@@ -204,6 +212,12 @@ impl Zone {
         self.middle = self.middle.max(low).min(high);
         let last = core::mem::replace(&mut self.last, angle);
         Slip { backward: angle < self.middle, slips: (ahead && angle > last) || (back && angle < last) }
+    }
+
+    /// Brings the end of the play to the angle that goes this way.
+    #[inline]
+    fn end_at(&mut self, angle: Angle, half_width: Angle, backward: bool) {
+        self.middle = if backward { angle.plus(half_width) } else { angle.minus(half_width) };
     }
 }
 
@@ -222,6 +236,7 @@ pub struct SheathObserver {
     second: bool,
     cables: [Follower; 2],
     zone: Zone,
+    joint: Zone,
     torque_in: Sum<Torque>,
     torque_out: Torque,
 }
@@ -242,9 +257,14 @@ impl SheathObserver {
         let torque_in = self.torque_in.approach(config.torque_filter, measured_in);
         let [a, b] = self.cables.map(|cable| cable.ratio.value());
         let half_width = config.zone.apply(a.half_sum(b)).plus(config.play);
-        let slip = self.zone.step(input.motion.angle, half_width);
+        let mut slip = self.zone.step(input.motion.angle, half_width);
         // One cable a tick: half of the work, and a cable changes little in two ticks.
         self.second = !self.second;
+        // The joint in the tick in which nothing is learned from its angle: it changes by a count a millisecond at most.
+        if !self.second && self.joint_follows(config, input) {
+            slip = Slip { backward: input.motion.speed < Speed::ZERO, slips: true };
+            self.zone.end_at(input.motion.angle, half_width, slip.backward);
+        }
         if config.adapts {
             match config.fitted {
                 Fitted::All => self.learn_from_tensions(config, input.tensions, slip),
@@ -258,15 +278,23 @@ impl SheathObserver {
     }
 
     fn start(&mut self, config: &SheathConfig, input: &SheathInput, torque_in: Torque) {
-        let angle = input.motion.angle;
         *self = Self {
             started: true,
             second: false,
             cables: [Follower::at(config.nominal); 2],
-            zone: Zone { middle: angle, last: angle },
+            zone: Zone::around(input.motion.angle),
+            joint: Zone::around(input.theta_out),
             torque_in: Sum::at(torque_in),
             torque_out: config.torque_ratio.apply(torque_in),
         };
+    }
+
+    /// The joint goes the way that the input pulley goes.
+    #[inline]
+    fn joint_follows(&mut self, config: &SheathConfig, input: &SheathInput) -> bool {
+        let joint = self.joint.step(input.theta_out, config.joint_play);
+        let backward = input.motion.speed < Speed::ZERO;
+        joint.slips && joint.backward == backward
     }
 
     fn learn_from_tensions(&mut self, config: &SheathConfig, tensions: [Tension; 4], slip: Slip) {
@@ -520,6 +548,40 @@ mod tests {
         assert!(before.known && !after.known);
         let change = exponent(after.ratio[0]) / exponent(before.ratio[0]) - 1.0;
         assert!(change.abs() < 0.02, "{change}");
+    }
+
+    #[test]
+    fn a_joint_that_follows_ends_a_zone_that_is_thought_too_wide() {
+        // mu K thought three times what it is: the zone would be 2.4·27.4 mrad·tanh(0.565) = 33.7 mrad wide, and the pulley
+        // turns within 24 mrad. The true one is 10.2 mrad: the joint goes nine counts to and fro.
+        for (fitted, allowed) in [(2.0, 0.02), (1.0, 0.05), (0.0, 0.4)] {
+            let mut config = config(fitted);
+            config.nominal = Ratio::from_f32((3.0 * 0.12 * PI / 2.0).tanh() as f32);
+            let mut observer = SheathObserver::default();
+            let estimate = follow(&config, &mut observer, 4.0, 0.024, |_| [0.12 * PI; 2]);
+            let off = exponent(estimate.ratio[0]) / (0.12 * PI) - 1.0;
+            assert!(off.abs() < allowed, "fitted {fitted}: {off}");
+        }
+    }
+
+    #[test]
+    fn a_joint_that_swings_by_a_count_does_not_tell_of_slip() {
+        // The pulley swings within the zone, the joint's count with it; the ends of the cables do not differ.
+        for fitted in [2.0, 1.0] {
+            let config = config(fitted);
+            let mut observer = SheathObserver::default();
+            let tensions = [Tension::from_f32(30.0); 4];
+            for tick in 0..10_000 {
+                let (sine, cosine) = (f64::from(tick) * 2.0 * PI * 4.0 * PERIOD_S).sin_cos();
+                let motion = Motion {
+                    angle: Angle::from_f32(0.001 * sine as f32),
+                    speed: Speed::from_f32(0.025 * cosine as f32),
+                };
+                let theta_out = Angle::from_f32(if sine > 0.0 { (TAU / 4096.0) as f32 } else { 0.0 });
+                let input = SheathInput { tensions, motion, theta_out, ..SheathInput::default() };
+                assert!(!observer.observe(&config, &input).slips, "fitted {fitted}, tick {tick}");
+            }
+        }
     }
 
     #[test]

@@ -417,6 +417,7 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
         stretch: gain(stretch_nm, "tendon.axial_stiffness")?,
         zone: gain(ZONE_MARGIN * half_zone_rad, "tendon.axial_stiffness")?,
         play: Angle::from_f32(0.5 * ZONE_MARGIN * play_rad),
+        joint_play: Angle::from_f32(RAD_PER_COUNT + 0.5 * backlash.enable * backlash.joint_gap),
         half_zone: gain(half_zone_rad, "tendon.axial_stiffness")?,
         angle_ratio: gain(ratio, "pulley.output_radius")?,
         torque_ratio: gain(ratio, "pulley.output_radius")?,
