@@ -11,17 +11,21 @@
 //! | position | `τ = J (k_p e + k_i ∫e dt + k_d (ω_c − ω) + α_c) + b ω + τ_m + g (F1 − F3) r1`, `e = θ_c − θ`; `k_p = ω_n²`, `k_d = 2ζω_n`, `k_i = k_p/T_i` |
 //! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + τ_m + k (e + ∫e dt/T_i) − d ω − d_T dT_in/dt`, `e = (r1/r2)(T_d − T_out)`, s the sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) with the `mu K` of [`crate::sheath`]; `g M s` and `dT_in/dt` are low-passed |
 //!
+//! In position mode with `compensator.source` 3 and measured input tensions, `θ_c` yields to a load that rings ([`ring`]).
+//!
 //! `τ_m` is what [`crate::correction`] adds for friction and ripple of the motor; the duty gets what the bridge leaves of it.
 //! The measured input torque is fed forward, so the position loop sees the rotor alone, whatever weight and friction do.
 //! The integral rests (flag [`Limit::Integrator`]) while current or duty are at their limit and the error would push
 //! further, and while the count does not tell an error.
 
+pub mod ring;
 pub mod yielding;
 
 use bowden_link::{Limit, Limits};
 
 use crate::correction::MotorCorrection;
 use crate::correction::dead_zone::DeadZone;
+use crate::drive::ring::{Ring, RingConfig};
 use crate::observer::Motion;
 use crate::scale::{
     Acceleration, Angle, Current, Gain, Quantity, Share, Speed, Sum, Torque, Voltage, Weight,
@@ -69,6 +73,8 @@ pub struct PositionConfig {
     pub load_feedforward: Gain<Torque, Torque>,
     /// Half a count.
     pub half_count: Angle,
+    /// Damping of a load that rings; none where the input torque is not measured or the compensation is not adaptive.
+    pub ring: Option<RingConfig>,
 }
 
 /// Gains of the torque loop.
@@ -99,6 +105,7 @@ pub struct TorqueConfig {
 pub struct Loops {
     acceleration: Sum<Acceleration>,
     feedforward: Sum<Acceleration>,
+    ring: Ring,
     torque: Sum<Torque>,
     friction: Sum<Torque>,
     /// Low-passed input torque.
@@ -170,8 +177,12 @@ impl Loops {
         input: &PositionInput,
         limits: &mut Limits,
     ) -> Torque {
-        let error = input.command.minus(input.motion.angle);
-        let told = !input.command.minus(input.measured).is_at_most(config.half_count);
+        let command = match &config.ring {
+            Some(ring) => input.command.minus(self.ring.yields(ring, input.torque_in)),
+            None => input.command,
+        };
+        let error = command.minus(input.motion.angle);
+        let told = !command.minus(input.measured).is_at_most(config.half_count);
         let yields = i32::from(self.yields) * error.to_bits().signum() > 0;
         if told && !yields && self.may_integrate(error.to_bits(), limits) {
             self.acceleration.add(config.integral, error);

@@ -13,6 +13,7 @@ use crate::correction::dead_zone::DeadZone;
 use crate::correction::eccentricity::Eccentricity;
 use crate::correction::joint::JointCorrection;
 use crate::correction::lead::{LeadConfig, Leads};
+use crate::drive::ring::RingConfig;
 use crate::drive::yielding::YieldConfig;
 use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::encoder::multi_turn::StepLimit;
@@ -433,6 +434,9 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
     })
 }
 
+/// `compensator.source`: friction as it is followed.
+const ADAPTIVE: f32 = 3.0;
+
 fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Refusal> {
     /// Low-pass of the reference's acceleration, s. Lag of a 1.5 Hz sine: 5°.
     const ACCELERATION_FILTER_S: f32 = 0.01;
@@ -452,6 +456,11 @@ fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Re
         acceleration_filter: Weight::low_pass(ACCELERATION_FILTER_S, period_s),
         load_feedforward: gain(controller.load_feedforward, "controller.load_feedforward")?,
         half_count: Angle::from_f32(0.5 * RAD_PER_COUNT),
+        ring: if parameters.compensator.source == ADAPTIVE && fitted(parameters) != Fitted::Nothing {
+            Some(RingConfig::new(parameters).ok_or_else(|| conflict("controller.tension_damping"))?)
+        } else {
+            None
+        },
     })
 }
 

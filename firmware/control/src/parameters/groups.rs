@@ -158,7 +158,7 @@ pub struct Loops {
     pub torque_integral_time: f32,
     /// Torque loop: damping of the input pulley, N·m·s/rad.
     pub torque_damping: f32,
-    /// Torque loop: damping by the rate of the input torque, s.
+    /// Torque loop, and position loop with `compensator.source` 3: damping by the change of the input torque, s.
     pub tension_damping: f32,
     /// Torque loop: part of the sheath friction of Eq. (15)-(17) that is fed forward.
     pub friction_feedforward: f32,
