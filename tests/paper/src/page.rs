@@ -95,7 +95,7 @@ pub fn write_tracking(table: &str, provenance: &str, page: &Path) -> Result<(), 
          pi/2 and 3 pi/2.\n\n\
          `cargo xtask paper --beyond` wrote this page: {provenance}.\n\n\
          *Removed* is the part of the error without compensation that is gone, seed by seed. Parameters are the same for \
-         both loads;\nthose of a sensor set were chosen on seeds 101 to 103, the figures come from seeds {} on. The first two \
+         both loads;\nthose of a sensor set were chosen on seeds 101 to 110, the figures come from seeds {} on. The first two \
          sets run in position\nmode with `compensator.source` 3, the last in torque mode. A run that the supervisor stops counts \
          as nothing removed.\n\n{table}",
         crate::beyond::FIRST_SEED
