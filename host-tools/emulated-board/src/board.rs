@@ -31,6 +31,7 @@ pub struct BoardBuilder<'a> {
     effects: Vec<ConcealedEffect>,
     seed: u64,
     mountings: [EncoderMounting; 2],
+    motor_reversed: bool,
     parameter_pages: Option<Vec<u8>>,
 }
 
@@ -58,6 +59,13 @@ impl BoardBuilder<'_> {
         self
     }
 
+    /// Whether the motor's leads are the wrong way round: a positive duty turns towards negative angles. The default is no.
+    #[must_use]
+    pub fn motor_reversed(mut self, reversed: bool) -> Self {
+        self.motor_reversed = reversed;
+        self
+    }
+
     /// Content of the last 16 KiB of flash, as [`Board::flash_image`] gave it; the default is erased.
     #[must_use]
     pub fn flash_image(mut self, content: &[u8]) -> Self {
@@ -72,7 +80,7 @@ impl BoardBuilder<'_> {
     pub fn build(self) -> Result<Board, BoardError> {
         let image = Image::parse(self.elf)?;
         let rtt = Rtt::new(self.elf, image.rtt)?;
-        let rig = Rig::new(&self.config, &self.effects, self.mountings, self.seed)?;
+        let rig = Rig::new(&self.config, &self.effects, self.mountings, self.motor_reversed, self.seed)?;
         let mut bus = Bus::new(rig);
         if let Some(content) = self.parameter_pages {
             if content.len() != WRITABLE_FLASH.size as usize {
@@ -161,6 +169,7 @@ impl Board {
             effects: Vec::new(),
             seed: 1,
             mountings: [amt22(1000), amt22(2000)],
+            motor_reversed: false,
             parameter_pages: None,
         }
     }
@@ -383,6 +392,15 @@ impl Board {
     }
 
     // ---- interventions ----------------------------------------------------------------------------------------
+
+    /// Moves the sheaths of cable a and b to these wrap angles \[rad\].
+    ///
+    /// # Errors
+    /// [`BoardError::Bench`] if one is out of range; the sheaths stay where they were.
+    pub fn set_wrap_angle_rad(&mut self, wrap_angle_rad: [f64; 2]) -> Result<(), BoardError> {
+        let now_s = self.time_s();
+        Ok(self.bus_mut().rig.set_wrap_angle_rad(now_s, wrap_angle_rad)?)
+    }
 
     /// Lets something go wrong until [`Self::clear`].
     pub fn inject(&mut self, injection: Injection) {

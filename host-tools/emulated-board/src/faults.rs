@@ -53,6 +53,8 @@ pub enum Injection {
     TensionGain(TensionAt, f64),
     /// A tension reading stays where it is.
     TensionStuck(TensionAt),
+    /// Two tension channels are plugged into each other's inputs.
+    TensionSwapped(TensionAt, TensionAt),
     /// The current reading is off by this much \[A\].
     CurrentOffset(f64),
     /// The wire of the current sensor breaks.

@@ -19,11 +19,13 @@ struct TensionFault {
     offset_n: f64,
     gain: f64,
     stuck_v: Option<f64>,
+    /// Channel whose sensor is plugged in here instead.
+    plugged_in: Option<usize>,
 }
 
 impl Default for TensionFault {
     fn default() -> Self {
-        Self { wire: None, offset_n: 0.0, gain: 1.0, stuck_v: None }
+        Self { wire: None, offset_n: 0.0, gain: 1.0, stuck_v: None, plugged_in: None }
     }
 }
 
@@ -43,6 +45,8 @@ pub(crate) enum Input {
 pub(crate) struct Rig {
     bench: LiveBench,
     bridge: Bridge,
+    /// The motor's leads are the wrong way round.
+    motor_reversed: bool,
     nominal_supply_v: f64,
     pretension: [f64; 2],
     /// Encoder at the input pulley and at the joint.
@@ -79,17 +83,19 @@ fn rail_v(rail: Rail) -> f64 {
 }
 
 impl Rig {
-    /// A bench at rest, bridge open.
+    /// A bench at rest, bridge open. With `motor_reversed`, a positive duty turns towards negative angles.
     pub(crate) fn new(
         config: &BenchConfig,
         effects: &[ConcealedEffect],
         mountings: [EncoderMounting; 2],
+        motor_reversed: bool,
         seed: u64,
     ) -> Result<Self, BenchError> {
         let [input, joint] = mountings;
         Ok(Self {
             bench: LiveBench::new(config, effects, seed)?,
             bridge: Bridge::Open,
+            motor_reversed,
             nominal_supply_v: config.supply_v,
             pretension: [1.0; 2],
             encoders: [
@@ -115,9 +121,23 @@ impl Rig {
     /// Steps the bench up to board time `time_s`.
     pub(crate) fn advance(&mut self, time_s: f64) {
         let step_s = self.bench.config().step_s;
+        let at_motor = match self.bridge {
+            Bridge::Duty(duty) if self.motor_reversed => Bridge::Duty(-duty),
+            other => other,
+        };
         while self.bench.time_s() + step_s <= time_s {
-            self.bench.step(self.bridge);
+            self.bench.step(at_motor);
         }
+    }
+
+    /// Moves the sheaths of cable a and b at `time_s` to these wrap angles \[rad\].
+    pub(crate) fn set_wrap_angle_rad(
+        &mut self,
+        time_s: f64,
+        wrap_angle_rad: [f64; 2],
+    ) -> Result<(), BenchError> {
+        self.advance(time_s);
+        self.bench.set_wrap_angle_rad(wrap_angle_rad)
     }
 
     /// Changes what the bridge does from `time_s` on.
@@ -141,11 +161,14 @@ impl Rig {
         match input {
             Input::Tension(index) => {
                 let fault = self.tension_faults[index];
-                let tension_n = self.bench.sensed(TENSIONS[index]) * fault.gain + fault.offset_n;
+                let sensor = TENSIONS[fault.plugged_in.unwrap_or(index)];
+                let tension_n = self.bench.sensed(sensor) * fault.gain + fault.offset_n;
                 fault.wire.map(rail_v).or(fault.stuck_v).unwrap_or_else(|| analog::tension_v(tension_n))
             }
             Input::Current => {
-                let current_a = self.bench.sensed(Channel::Current) + self.current_offset_a;
+                // The shunt is in the bridge's line to the motor: it sees the leads as the bridge does.
+                let sign = if self.motor_reversed { -1.0 } else { 1.0 };
+                let current_a = sign * self.bench.sensed(Channel::Current) + self.current_offset_a;
                 self.current_wire.map_or_else(|| analog::current_v(current_a), rail_v)
             }
             Input::Bus => analog::bus_v(self.bench.supply_v()),
@@ -169,6 +192,11 @@ impl Rig {
                 let index = tension_index(at);
                 let volts = analog::tension_v(self.bench.tensions_n()[index]);
                 self.tension_faults[index].stuck_v = on.then_some(volts);
+            }
+            Injection::TensionSwapped(one, other) => {
+                let [one, other] = [one, other].map(tension_index);
+                self.tension_faults[one].plugged_in = on.then_some(other);
+                self.tension_faults[other].plugged_in = on.then_some(one);
             }
             Injection::CurrentOffset(offset_a) => self.current_offset_a = if on { offset_a } else { 0.0 },
             Injection::CurrentWire(rail) => self.current_wire = on.then_some(rail),
@@ -213,10 +241,14 @@ mod tests {
     use crate::encoders::EncoderPart;
 
     fn rig() -> Rig {
+        wired(false)
+    }
+
+    fn wired(motor_reversed: bool) -> Rig {
         let config = BenchConfig { tension_noise_n: 0.0, current_noise_a: 0.0, ..BenchConfig::default() };
         let mounting =
             |count_at_zero| EncoderMounting { part: EncoderPart::Amt22, count_at_zero, reversed: false };
-        Rig::new(&config, &[], [mounting(1000), mounting(2000)], 1).expect("default bench")
+        Rig::new(&config, &[], [mounting(1000), mounting(2000)], motor_reversed, 1).expect("default bench")
     }
 
     #[test]
@@ -239,6 +271,41 @@ mod tests {
         rig.set_bridge(0.1, Bridge::Open);
         assert!(rig.bench().theta_out_rad() > 0.01, "{}", rig.bench().theta_out_rad());
         assert_eq!(rig.volts(Input::Current, 0.101), 1.65, "nothing flows through an open bridge");
+    }
+
+    #[test]
+    fn a_reversed_motor_turns_the_other_way_and_the_shunt_does_not_notice() {
+        let run = |motor_reversed| {
+            let mut rig = wired(motor_reversed);
+            rig.set_bridge(0.0, Bridge::Duty(0.2));
+            let volts = rig.volts(Input::Current, 0.01);
+            (rig.bench().theta_in_rad(), volts)
+        };
+        let ([right, reversed], duty) = ([run(false), run(true)], Bridge::Duty(0.2));
+        // Both cables are alike, so that the motions are mirrored but for rounding.
+        assert!(right.0 > 1e-3 && (right.0 + reversed.0).abs() < 1e-9, "{right:?} {reversed:?}");
+        assert!((right.1 - reversed.1).abs() < 1e-6 && right.1 > 1.65, "{right:?} {reversed:?}");
+        let mut rig = wired(true);
+        rig.set_bridge(0.0, duty);
+        assert_eq!(rig.bridge(), duty, "as the bridge has it");
+    }
+
+    #[test]
+    fn swapped_channels_show_each_other_and_moved_sheaths_change_the_friction() {
+        let mut rig = rig();
+        rig.set_bridge(0.0, Bridge::Duty(0.05));
+        rig.set_wrap_angle_rad(0.0, [1.0, 6.0]).expect("in range");
+        let [f1, _, f3, _] = [0, 1, 2, 3].map(|index| rig.volts(Input::Tension(index), 0.5));
+        let swapped = Injection::TensionSwapped(TensionAt::F1, TensionAt::F3);
+        rig.inject(swapped, true, 0.5);
+        let volts = |rig: &mut Rig| [0, 2].map(|index| rig.volts(Input::Tension(index), 0.5));
+        assert_eq!(volts(&mut rig), [f3, f1]);
+        rig.inject(swapped, false, 0.5);
+        assert_eq!(volts(&mut rig), [f1, f3]);
+        // Cable b is wrapped more: its ends are further apart.
+        let [f1, f2, f3, f4] = rig.bench().tensions_n();
+        assert!((f4 / f3).ln().abs() > 2.0 * (f1 / f2).ln().abs(), "{f1} {f2} {f3} {f4}");
+        assert!(rig.set_wrap_angle_rad(0.5, [-1.0, 1.0]).is_err());
     }
 
     #[test]
