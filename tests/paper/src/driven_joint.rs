@@ -11,7 +11,7 @@ use bowden_control::tick::{Command, EncoderWord, Queues, TickInput, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
 use bowden_link::message::{Goal, Reference};
-use virtual_bench::{BenchConfig, Bridge, Channel, LiveBench};
+use virtual_bench::{BenchConfig, Bridge, Channel, ConcealedEffect, LiveBench};
 
 use crate::error::ExperimentError;
 
@@ -79,10 +79,23 @@ impl DrivenJoint {
     /// # Errors
     /// [`ExperimentError`] if bench or parameters are out of range.
     pub fn new(bench: &BenchConfig, parameters: Parameters, seed: u64) -> Result<Self, ExperimentError> {
+        Self::concealing(bench, &[], parameters, seed)
+    }
+
+    /// The same on a bench that conceals `effects`.
+    ///
+    /// # Errors
+    /// As [`DrivenJoint::new`], and if an effect is given twice.
+    pub fn concealing(
+        bench: &BenchConfig,
+        effects: &[ConcealedEffect],
+        parameters: Parameters,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
         let controller = Controller::new(tick_config(&parameters)?);
         let steps_per_tick = (1.0 / (f64::from(parameters.tick_rate_hz()) * bench.step_s)).round() as usize;
         Ok(Self {
-            bench: LiveBench::new(bench, &[], seed)?,
+            bench: LiveBench::new(bench, effects, seed)?,
             parameters,
             controller,
             queues: Queues::default(),
@@ -99,16 +112,40 @@ impl DrivenJoint {
     /// As [`DrivenJoint::new`]; [`ExperimentError::Stopped`] or [`ExperimentError::NotReady`] if a check does not pass.
     pub fn ready(bench: &BenchConfig, parameters: Parameters, seed: u64) -> Result<Self, ExperimentError> {
         let mut joint = Self::new(bench, parameters, seed)?;
+        joint.make_ready()?;
+        Ok(joint)
+    }
+
+    /// Self test and pretension check of a joint whose board was just switched on.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Stopped`] or [`ExperimentError::NotReady`] if a check does not pass.
+    pub fn make_ready(&mut self) -> Result<(), ExperimentError> {
         // Encoder frames are a tick old: the first ones are not there yet.
         for _ in 0..100 {
-            joint.tick()?;
+            self.tick()?;
         }
-        joint.order(Goal::Ready);
-        let ticks = (READY_LIMIT_S * joint.tick_rate_hz()) as usize;
+        self.order(Goal::Ready);
+        self.reach_ready(READY_LIMIT_S)
+    }
+
+    /// Moves a ready joint to angle zero, within `limit_s`.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Stopped`] or [`ExperimentError::NotReady`] if it does not arrive.
+    pub fn home(&mut self, limit_s: f64) -> Result<(), ExperimentError> {
+        self.order(Goal::Home);
+        // The order is taken in this tick.
+        self.tick()?;
+        self.reach_ready(limit_s)
+    }
+
+    fn reach_ready(&mut self, limit_s: f64) -> Result<(), ExperimentError> {
+        let ticks = (limit_s * self.tick_rate_hz()) as usize;
         for _ in 0..ticks {
-            joint.tick()?;
-            if joint.controller.state() == State::Ready {
-                return Ok(joint);
+            self.tick()?;
+            if self.controller.state() == State::Ready {
+                return Ok(());
             }
         }
         Err(ExperimentError::NotReady)

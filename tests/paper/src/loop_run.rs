@@ -5,6 +5,7 @@
 
 use std::f64::consts::PI;
 
+use bowden_control::parameters::Parameters;
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_model::paper::TendonPair;
 use bowden_model::parameters::{PulleyParameters, SheathParameters, TendonParameters};
@@ -72,6 +73,16 @@ impl LoopSetup {
         }
     }
 
+    /// Parameters of the firmware for this run.
+    #[must_use]
+    pub fn parameters(&self) -> Parameters {
+        let mut parameters = parameters_of(&self.bench());
+        parameters.compensator.source = 0.0;
+        // Whether a tendon goes slack is a result here, read from the true tensions; the supervisor must not end the run.
+        parameters.tension.slack = -100.0;
+        parameters
+    }
+
     /// The paper's equations for this run: evenly bent sheaths.
     ///
     /// # Errors
@@ -122,12 +133,7 @@ pub struct LoopSample {
 /// # Errors
 /// [`ExperimentError`] if the supervisor stops the joint or a parameter is out of range.
 pub fn run(setup: &LoopSetup, seed: u64) -> Result<Vec<LoopSample>, ExperimentError> {
-    let bench = setup.bench();
-    let mut parameters = parameters_of(&bench);
-    parameters.compensator.source = 0.0;
-    // Whether a tendon goes slack is a result here, read from the true tensions; the supervisor must not end the run.
-    parameters.tension.slack = -100.0;
-    let mut joint = DrivenJoint::ready(&bench, parameters, seed)?;
+    let mut joint = DrivenJoint::ready(&setup.bench(), setup.parameters(), seed)?;
     joint.refer(Reference::Generated {
         shape: Shape::Sine,
         amplitude: setup.amplitude_rad as f32,

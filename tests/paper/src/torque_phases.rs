@@ -115,8 +115,15 @@ pub fn letters(samples: &[PhasedSample], phase: fn(&PhasedSample) -> TorquePhase
 /// [`ExperimentError`] if the run or its evaluation fails.
 pub fn torque_loop() -> Result<TorqueLoop, ExperimentError> {
     let setup = setup();
+    evaluate(&setup, run(&setup, 1)?)
+}
+
+/// Compares a recording of Fig. 4, a thousand samples a second, with Eq. (17).
+///
+/// # Errors
+/// [`ExperimentError`] if the setup has no equations or the loop is not closed.
+pub fn evaluate(setup: &LoopSetup, recorded: Vec<LoopSample>) -> Result<TorqueLoop, ExperimentError> {
     let pair = setup.pair()?;
-    let recorded = run(&setup, 1)?;
     let speeds = averaged(&recorded, |sample| sample.omega_out_rad_per_s);
     let torques = averaged(&recorded, |sample| sample.torque_in_nm);
     let fastest = speeds.iter().copied().map(f64::abs).fold(0.0, f64::max);
