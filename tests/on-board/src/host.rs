@@ -294,6 +294,18 @@ impl Host {
         }
     }
 
+    /// Sets all parameters that differ from the defaults, in their order, on a board that has the defaults.
+    pub fn set_all(&mut self, parameters: &Parameters) -> Outcome {
+        let defaults = Parameters::default();
+        for index in 0..Parameters::COUNT {
+            let (Some(value), Some(default)) = (parameters.get(index), defaults.get(index)) else { continue };
+            if value != default {
+                self.order(&ToBoard::WriteParameter { index, value })?;
+            }
+        }
+        Ok(())
+    }
+
     /// Values of all parameters in their order.
     pub fn all_values(&mut self) -> Outcome<Vec<f32>> {
         self.ask_all((0..Parameters::COUNT).map(ToBoard::ReadParameter))?

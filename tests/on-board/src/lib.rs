@@ -15,6 +15,7 @@ pub mod load;
 pub mod telemetry;
 pub mod ticks;
 pub mod tool;
+pub mod trial;
 
 use std::fmt;
 

@@ -6,12 +6,15 @@ mod closed_loop;
 mod conformance;
 mod coverage;
 mod determinism;
+mod directions;
 mod failures;
 mod faults;
 mod load;
+mod moved_sheath;
 mod parameters;
 mod stop;
 mod terminal;
+mod torque_mode;
 mod usb;
 
 use bowden_board::Board;
