@@ -228,6 +228,37 @@ struct Slip {
     slips: bool,
 }
 
+/// What follows from `q` of both cables; computed every second tick, as `q` changes little in one.
+#[derive(Clone, Copy, Debug, Default)]
+struct Friction {
+    /// At the input pulley.
+    torque: Torque,
+    /// At the joint.
+    torque_out: Torque,
+    /// Half of the dead zone.
+    angle: Angle,
+    /// Half of the dead zone with margin and play.
+    half_width: Angle,
+    known: bool,
+}
+
+impl Friction {
+    #[inline]
+    fn of(config: &SheathConfig, cables: &[Follower; 2]) -> Self {
+        let [a, b] = cables.each_ref().map(|cable| cable.ratio.value());
+        let mean = a.half_sum(b);
+        let torque = config.friction.apply(mean.times(exponent_per_ratio(mean)));
+        let known = |cable: &Follower| cable.variance.value() < config.known_below;
+        Self {
+            torque,
+            torque_out: config.torque_ratio.apply(torque),
+            angle: config.half_zone.apply(mean),
+            half_width: config.zone.apply(mean).plus(config.play),
+            known: !config.adapts || cables.iter().all(known),
+        }
+    }
+}
+
 /// State of the observer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SheathObserver {
@@ -235,6 +266,7 @@ pub struct SheathObserver {
     /// It is the turn of the second cable.
     second: bool,
     cables: [Follower; 2],
+    friction: Friction,
     zone: Zone,
     joint: Zone,
     torque_in: Sum<Torque>,
@@ -255,8 +287,7 @@ impl SheathObserver {
             self.start(config, input, measured_in);
         }
         let torque_in = self.torque_in.approach(config.torque_filter, measured_in);
-        let [a, b] = self.cables.map(|cable| cable.ratio.value());
-        let half_width = config.zone.apply(a.half_sum(b)).plus(config.play);
+        let half_width = self.friction.half_width;
         let mut slip = self.zone.step(input.motion.angle, half_width);
         // One cable a tick: half of the work, and a cable changes little in two ticks.
         self.second = !self.second;
@@ -274,14 +305,19 @@ impl SheathObserver {
                 Fitted::Nothing | Fitted::Input => {}
             }
         }
+        if self.second {
+            self.friction = Friction::of(config, &self.cables);
+        }
         self.estimate(config, input, torque_in, slip.slips)
     }
 
     fn start(&mut self, config: &SheathConfig, input: &SheathInput, torque_in: Torque) {
+        let cables = [Follower::at(config.nominal); 2];
         *self = Self {
             started: true,
             second: false,
-            cables: [Follower::at(config.nominal); 2],
+            cables,
+            friction: Friction::of(config, &cables),
             zone: Zone::around(input.motion.angle),
             joint: Zone::around(input.theta_out),
             torque_in: Sum::at(torque_in),
@@ -349,9 +385,8 @@ impl SheathObserver {
         torque_in: Torque,
         slips: bool,
     ) -> SheathEstimate {
-        let ratio = self.cables.map(|cable| cable.ratio.value());
-        let mean = ratio[0].half_sum(ratio[1]);
-        let friction = config.friction.apply(mean.times(exponent_per_ratio(mean)));
+        let Friction { torque: friction, torque_out: friction_torque, angle: friction_angle, known, .. } =
+            self.friction;
         self.torque_out = match config.fitted {
             Fitted::All => input.torque_out,
             // Eq. (17): the output keeps its torque until the input is beyond the friction.
@@ -361,15 +396,14 @@ impl SheathObserver {
                 self.torque_out.max(low).min(high)
             }
         };
-        let known = |cable: &Follower| cable.variance.value() < config.known_below;
         SheathEstimate {
-            ratio,
-            friction_torque: config.torque_ratio.apply(friction),
-            friction_angle: config.half_zone.apply(mean),
+            ratio: self.cables.map(|cable| cable.ratio.value()),
+            friction_torque,
+            friction_angle,
             torque_in,
             torque_out: self.torque_out,
             slips,
-            known: !config.adapts || self.cables.iter().all(known),
+            known,
         }
     }
 }
