@@ -9,8 +9,9 @@
 //! | [`from_rig`] | the board's parameters from what a fit or a diagnosis found |
 //! | [`session`] | from off to a running reference and back to off |
 //! | [`course`] | what the joint is to follow |
-//! | [`conversion`], [`recorder`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
+//! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
 
+pub mod capture;
 pub mod client;
 pub mod conversion;
 pub mod course;

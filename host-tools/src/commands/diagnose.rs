@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use bowden_model::effects::CATALOGUE;
 
 use super::{all_paths, load_recordings, outcome_of, print};
-use crate::diagnose::diagnose;
+use crate::diagnose::{Diagnosed, diagnose};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
@@ -98,19 +98,7 @@ impl DiagnoseArguments {
         let progress = &UntilInterrupted(progress);
         let also: Vec<&str> = self.also.iter().map(String::as_str).collect();
         let diagnosed = diagnose(&task.rig, &task.training, &task.heldout, &also, progress)?;
-        let [result, page, rig] = FILES.map(|name| task.out.join(name));
-        let json = serde_json::to_string_pretty(&diagnosed.findings.diagnosis)
-            .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
-        output::write_file(&result, |file| writeln!(file, "{json}"))?;
-        output::write_file(&page, |file| file.write_all(report::render(&diagnosed.findings).as_bytes()))?;
-        diagnosed.write_into(&mut task.document)?;
-        task.document.save(&rig)?;
-        for earlier in earlier_experiments(&task.out) {
-            output::remove_file(&task.out.join(earlier))?;
-        }
-        for experiment in &diagnosed.experiments {
-            experiment.reference.save(&task.out.join(&experiment.file))?;
-        }
+        let page = save(&diagnosed, &mut task.document, &task.out)?;
         print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
         let mut outcome = outcome_of(task.training.iter().chain(&task.heldout));
         if !diagnosed.findings.diagnosis.complete {
@@ -120,6 +108,28 @@ impl DiagnoseArguments {
         }
         Ok(outcome)
     }
+}
+
+/// Writes result, report, rig and references of a diagnosis into its folder, in place of an earlier one's; returns where the
+/// report is. `document` is the rig file that was diagnosed and gets the physics that was found.
+///
+/// # Errors
+/// When the medium refuses, or the rig file cannot take a value.
+pub fn save(diagnosed: &Diagnosed, document: &mut RigDocument, folder: &Path) -> Result<PathBuf, Failure> {
+    let [result, page, rig] = FILES.map(|name| folder.join(name));
+    let json = serde_json::to_string_pretty(&diagnosed.findings.diagnosis)
+        .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
+    output::write_file(&result, |file| writeln!(file, "{json}"))?;
+    output::write_file(&page, |file| file.write_all(report::render(&diagnosed.findings).as_bytes()))?;
+    diagnosed.write_into(document)?;
+    document.save(&rig)?;
+    for earlier in earlier_experiments(folder) {
+        output::remove_file(&folder.join(earlier))?;
+    }
+    for experiment in &diagnosed.experiments {
+        experiment.reference.save(&folder.join(&experiment.file))?;
+    }
+    Ok(page)
 }
 
 /// Names of the references that an earlier diagnosis left in `folder`: they ask for what may be settled by now.

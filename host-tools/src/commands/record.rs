@@ -1,20 +1,18 @@
 //! `bowden record`: runs a joint on its board and records every control tick.
 
-use std::io;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use crate::interrupt;
-use crate::link::conversion::{Conversion, columns};
+use crate::link::capture::{Capture, PROGRESS_STEPS, save_parameters, sidecar};
 use crate::link::course::{Course, CourseArguments, run_seconds};
-use crate::link::recorder::{Recorder, Tally};
+use crate::link::recorder::Tally;
 use crate::link::rig_file::{self, Weight};
 use crate::link::session::{RunEnd, Session};
 use crate::link::{LinkError, ParameterSet, PortArguments};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::Progress;
-use crate::recording::{Format, RowWriter};
+use crate::recording::Format;
 
 /// Arguments of `bowden record`.
 #[derive(Clone, Debug, clap::Args)]
@@ -51,12 +49,6 @@ pub struct RecordArguments {
     #[arg(long, value_name = "KG,M", requires = "rig")]
     load: Option<Weight>,
 }
-
-/// Name under which an MCAP file keeps firmware version and parameters.
-const METADATA: &str = "bowden.parameters";
-
-/// Percent of a run that a step of the progress stands for.
-const PROGRESS_STEPS: u64 = 100;
 
 impl RecordArguments {
     /// Runs and records.
@@ -101,14 +93,14 @@ impl RecordArguments {
             progress.stage("homing", 0);
             session.home(stop)?;
         }
-        let conversion = Conversion::new(session.parameters())?;
         progress.stage("recording", if seconds.is_some() { PROGRESS_STEPS } else { 0 });
-        let (tally, end) = self.record(&mut session, format, conversion, &course, seconds, progress)?;
+        let capture =
+            Capture { out: &self.out, format, mode: self.course.mode(), every: self.every, seconds };
+        let (tally, end) = capture.run(&mut session, &course, stop, progress)?;
 
         let parameters = session.parameters();
         if let Some(path) = &sidecar {
-            let text = parameters.to_toml();
-            output::write_file(path, |file| io::Write::write_all(file, text.as_bytes()))?;
+            save_parameters(path, parameters)?;
         }
         if let Some(path) = &self.rig {
             let name = self.out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
@@ -117,59 +109,6 @@ impl RecordArguments {
         }
         let losses = *session.client().losses();
         self.conclude(&tally, end, seconds, tally.loss(&losses))
-    }
-
-    /// Runs along the course and writes the recording; it is kept whatever ended the run, unless it is empty.
-    fn record(
-        &self,
-        session: &mut Session,
-        format: Format,
-        conversion: Conversion,
-        course: &Course,
-        seconds: Option<f64>,
-        progress: &dyn Progress,
-    ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
-        let mode = self.course.mode();
-        let metadata = session.parameters().metadata();
-        let mut end = None;
-        let mut tally = Tally::default();
-        let written = output::write_file(&self.out, |file| {
-            let writer = RowWriter::new(format, &columns(Some(mode)), Some((METADATA, metadata)), file)?;
-            let mut recorder = Recorder::new(writer, conversion, mode, self.every);
-            let mut refusal = None;
-            let mut shown = 0;
-            end = Some(session.run(mode, course, &interrupt::requested, &mut |tick| {
-                if let Err(error) = recorder.tick(tick) {
-                    refusal = Some(error);
-                    return ControlFlow::Break(());
-                }
-                let Some(seconds) = seconds else { return ControlFlow::Continue(()) };
-                let share = recorder.tally().duration_s() / seconds;
-                let step = ((share * PROGRESS_STEPS as f64) as u64).min(PROGRESS_STEPS);
-                progress.advance(step - shown);
-                shown = step;
-                // Half a nanosecond is below every control period.
-                if recorder.tally().duration_s() >= seconds - 5e-10 {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            }));
-            if let Some(error) = refusal {
-                return Err(error);
-            }
-            tally = recorder.finish()?;
-            if tally.rows == 0 { Err(io::Error::other("the run gave no sample")) } else { Ok(()) }
-        });
-        match (written, end) {
-            (Ok(()), Some(end)) => Ok((tally, end)),
-            // Without a row there is nothing to keep, and what ended the run counts.
-            (Err(_), Some(Err(error))) => Err(error.into()),
-            (Err(_), Some(Ok(RunEnd::Fault(fault)))) => Err(LinkError::Fault(fault).into()),
-            (Err(_), Some(Ok(RunEnd::Interrupted))) if tally.rows == 0 => Err(LinkError::Interrupted.into()),
-            (Err(failure), _) => Err(failure),
-            (Ok(()), None) => Err(Failure::failed("the run did not begin; run it again")),
-        }
     }
 
     /// What the run amounts to.
@@ -206,31 +145,5 @@ impl RecordArguments {
             f64::from(tally.period_ns) * 1e-3
         ))?;
         Ok(outcome)
-    }
-}
-
-/// File beside a recording that says which firmware and parameters made it.
-fn sidecar(out: &Path) -> PathBuf {
-    let name = out.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let stem = [".csv.gz", ".csv"]
-        .iter()
-        .find(|ending| name.to_ascii_lowercase().ends_with(*ending))
-        .map_or(name.as_str(), |ending| &name[..name.len() - ending.len()]);
-    out.with_file_name(format!("{stem}.parameters.toml"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sidecar_stands_beside_the_recording() {
-        for (out, expected) in [
-            ("a/run.csv", "a/run.parameters.toml"),
-            ("run.2.CSV.GZ", "run.2.parameters.toml"),
-            ("b/x.csv.gz", "b/x.parameters.toml"),
-        ] {
-            assert_eq!(sidecar(Path::new(out)), Path::new(expected));
-        }
     }
 }
