@@ -38,6 +38,9 @@ pub use transport::Transport;
 /// Name of the simulated board.
 pub const SIM: &str = "sim";
 
+/// Beginning of the name of a simulated board whose joint conceals something.
+const SIM_CONCEALS: &str = "sim:";
+
 /// Name that stands for the one board on USB.
 pub const AUTO: &str = "auto";
 
@@ -45,7 +48,7 @@ pub const AUTO: &str = "auto";
 #[derive(Clone, Debug, clap::Args)]
 pub struct PortArguments {
     /// Serial port of the board, `auto` for the one on USB, or `sim` for a simulated board with a simulated joint,
-    /// switched on anew each time
+    /// switched on anew each time; `sim:joint_backlash:0.8,seed=7` for one that conceals something
     #[arg(long, value_name = "PATH|auto|sim")]
     port: String,
     /// How long an answer of the board is waited for, s
@@ -59,6 +62,10 @@ impl PortArguments {
     /// # Errors
     /// See [`serial::SerialTransport::open`], [`serial::find`] and [`Client::connect`].
     pub fn connect(&self) -> Result<Client, LinkError> {
+        if let Some(list) = self.port.strip_prefix(SIM_CONCEALS) {
+            let transport = sim::SimTransport::with(&sim::Concealed::parse(list)?)?;
+            return Client::connect(Box::new(transport), SIM, self.timeout);
+        }
         let (transport, name): (Box<dyn Transport>, String) = match self.port.as_str() {
             SIM => (Box::new(sim::SimTransport::new()), SIM.to_owned()),
             AUTO => {

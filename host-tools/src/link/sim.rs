@@ -1,17 +1,20 @@
-//! A board without hardware: the board's own control and services, natively, with a simulated joint behind the sensors.
+//! A board without hardware: the board's own control and services, natively, with the virtual bench behind the sensors.
 //!
 //! Bytes go in and out as on the wire; everything between the wire and the converters is the code that runs on the board.
 //! What is missing is the hardware: no flash (parameters are stored until the program ends), no USB, and time that
 //! passes only while somebody waits for it. Equal requests give equal answers, bit for bit.
 
 mod board;
+mod concealed;
 mod joint;
 
 use std::io;
 use std::time::Duration;
 
+use super::error::CommsError;
 use super::transport::Transport;
 use board::SimBoard;
+pub use concealed::Concealed;
 
 /// A simulated board at the other end.
 pub struct SimTransport {
@@ -20,9 +23,25 @@ pub struct SimTransport {
 
 impl SimTransport {
     /// A board that has just been switched on, with a joint at rest.
+    ///
+    /// # Panics
+    /// Never: a bench that conceals nothing can be simulated, which every test of this board relies on.
     #[must_use]
     pub fn new() -> Self {
-        Self { board: SimBoard::new() }
+        Self::with(&Concealed::default()).expect("the bench of the data sheet can be simulated")
+    }
+
+    /// A board that has just been switched on, with a joint at rest that conceals something.
+    ///
+    /// # Errors
+    /// [`CommsError::Open`], when such a bench cannot be simulated.
+    pub fn with(concealed: &Concealed) -> Result<Self, CommsError> {
+        let board = SimBoard::new(concealed).map_err(|error| CommsError::Open {
+            port: super::SIM.to_owned(),
+            reason: error.to_string(),
+            next: "conceal something else",
+        })?;
+        Ok(Self { board })
     }
 }
 

@@ -12,11 +12,10 @@ use bowden_control::tick_config;
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
 use bowden_link::message::{Boot, Provocation};
 use bowden_link::{Answer, Fault, FromBoard, Request, Sample, State};
+use virtual_bench::BenchError;
 
+use super::concealed::Concealed;
 use super::joint::SimJoint;
-
-/// Seed of the sensors' noise.
-const SEED: u64 = 1;
 
 /// Commands that wait for a tick, at most.
 const COMMANDS: usize = 4;
@@ -94,15 +93,18 @@ pub(super) struct SimBoard {
 impl SimBoard {
     /// A board that has just been switched on.
     ///
+    /// # Errors
+    /// When the bench cannot be simulated.
+    ///
     /// # Panics
     /// Never: default parameters fit together, which a test of theirs checks.
-    pub(super) fn new() -> Self {
+    pub(super) fn new(concealed: &Concealed) -> Result<Self, BenchError> {
         let parameters = Parameters::default();
         let config = tick_config(&parameters).expect("default parameters fit together");
         let identity =
             Identity { firmware: env!("CARGO_PKG_VERSION"), board: "simulated", boot: Boot::Power };
-        let joint = SimJoint::new(&parameters, SEED);
-        Self {
+        let joint = SimJoint::new(&parameters, concealed)?;
+        Ok(Self {
             controller: Controller::new(config),
             divider: parameters.rate_divider(),
             service: Service::new(identity, parameters, ""),
@@ -115,7 +117,7 @@ impl SimBoard {
             incoming: Accumulator::default(),
             outgoing: VecDeque::new(),
             next_frame: 0,
-        }
+        })
     }
 
     /// Time since it was switched on.
