@@ -55,7 +55,11 @@ impl<'p> Draft<'p> {
         let index = self.parameter(name)?.index;
         let (drafted, sources) = self.values.entry(index).or_default();
         *drafted = value;
-        sources.push(source.to_string());
+        let source = source.to_string();
+        // An effect clears the term before it sets its strength.
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
         Ok(())
     }
 
