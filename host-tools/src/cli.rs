@@ -48,6 +48,8 @@ enum Command {
     Simulate(SimulateArguments),
     /// Run the joint on a driver board along a reference and record every control tick
     Record(crate::commands::record::RecordArguments),
+    /// Excite, diagnose, correct and verify the joint on a driver board, all in one
+    Investigate(crate::commands::investigate::InvestigateArguments),
     /// Show, change, load, save and store the parameters of a driver board
     Params(crate::commands::params::ParamsArguments),
     /// Show the fault of a driver board, what led to it, and clear it
@@ -92,6 +94,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Simulate(arguments) => arguments.run(),
         Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),
         Command::Faults(arguments) => arguments.run(),
         Command::Send(arguments) => arguments.run(),

@@ -5,6 +5,7 @@ pub mod convert;
 pub mod diagnose;
 pub mod faults;
 pub mod fit;
+pub mod investigate;
 pub mod params;
 pub mod record;
 pub mod replay;

@@ -6,6 +6,7 @@ pub mod commands;
 pub mod diagnose;
 pub mod fit;
 pub mod interrupt;
+pub mod investigate;
 pub mod joint_model;
 pub mod link;
 pub mod marks;

@@ -9,6 +9,7 @@ mod axis;
 mod envelope;
 mod figures;
 mod free_form;
+mod investigation;
 mod map;
 mod names;
 mod page;
@@ -24,6 +25,7 @@ mod example;
 mod tests;
 
 use crate::diagnose::verdict::Findings;
+use crate::investigate::report::Investigation;
 
 /// HTML page of a diagnosis, complete in itself.
 ///
@@ -32,4 +34,10 @@ use crate::diagnose::verdict::Findings;
 #[must_use]
 pub fn render(findings: &Findings) -> String {
     page::page(findings).into_string()
+}
+
+/// HTML page of an investigation, complete in itself but for links to the pages of its diagnoses.
+#[must_use]
+pub fn render_investigation(investigation: &Investigation) -> String {
+    investigation::page(investigation).into_string()
 }

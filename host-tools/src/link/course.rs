@@ -246,6 +246,18 @@ impl Track {
         Ok(Self { t_s: recording.t_s().iter().map(|t_s| t_s - start_s).collect(), values })
     }
 
+    /// The reference angle of a recording in memory; its first sample is at 0 s. `None` without such a column.
+    pub fn of_angle(recording: &Recording) -> Option<Self> {
+        let values = recording.channel(Channel::ThetaRef)?.to_vec();
+        let start_s = recording.t_s().first().copied().unwrap_or(0.0);
+        Some(Self { t_s: recording.t_s().iter().map(|t_s| t_s - start_s).collect(), values })
+    }
+
+    /// Values at `rate_hz`.
+    pub fn values_at(&self, rate_hz: f64) -> Vec<f64> {
+        (0..).map_while(|index| self.point(index, rate_hz)).map(f64::from).collect()
+    }
+
     /// Length, s.
     pub fn duration_s(&self) -> f64 {
         self.t_s.last().copied().unwrap_or(0.0)

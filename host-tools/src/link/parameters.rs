@@ -51,6 +51,11 @@ impl ParameterSet {
         })
     }
 
+    /// What the board calls itself, with its firmware.
+    pub fn board(&self) -> String {
+        format!("{}, firmware {}", self.board, self.firmware)
+    }
+
     /// All parameters in the board's order.
     pub fn all(&self) -> &[Parameter] {
         &self.parameters
@@ -145,6 +150,18 @@ impl ParameterSet {
             }
         }
         parameters
+    }
+
+    /// The set with other values for some parameters.
+    #[must_use]
+    pub fn with(&self, values: &[(u16, f32)]) -> Self {
+        let mut set = self.clone();
+        for (index, value) in values {
+            if let Some(parameter) = set.parameters.get_mut(usize::from(*index)) {
+                parameter.value = *value;
+            }
+        }
+        set
     }
 
     /// Where a recording came from, as a format with room for it keeps it.

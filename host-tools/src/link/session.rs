@@ -14,6 +14,7 @@ use super::client::Client;
 use super::course::{Course, Track};
 use super::error::{CommsError, LinkError};
 use super::parameters::ParameterSet;
+use crate::outcome::Failure;
 
 /// Ticks after a confirmed order until the state shows that it was taken up.
 const SETTLED_TICKS: u32 = 20;
@@ -94,6 +95,16 @@ impl Session {
     /// Its parameters.
     pub fn parameters(&self) -> &ParameterSet {
         &self.parameters
+    }
+
+    /// Sets parameters, all of them or none.
+    ///
+    /// # Errors
+    /// As [`ParameterSet::replace`], or no answer.
+    pub fn replace_parameters(&mut self, values: &[(u16, f32)]) -> Result<(), Failure> {
+        self.parameters.replace(&mut self.client, values)?;
+        self.parameters = ParameterSet::read(&mut self.client)?;
+        Ok(())
     }
 
     /// Brings the board from where it is to ready: self test and pretension check. A joint that moves is stopped first.

@@ -54,9 +54,32 @@ struct Style {
     name: &'static str,
 }
 
-const MEASURED: Style = Style { class: "measured", name: "measured" };
-const BEFORE: Style = Style { class: "before", name: "rig file" };
-const AFTER: Style = Style { class: "after", name: "diagnosed" };
+/// What the three lines of a figure are called, and their differences.
+#[derive(Clone, Copy)]
+struct Words {
+    measured: Style,
+    before: Style,
+    after: Style,
+    difference: &'static str,
+    enlarged: &'static str,
+}
+
+/// A recording and its simulations.
+const SIMULATION: Words = Words {
+    measured: Style { class: "measured", name: "measured" },
+    before: Style { class: "before", name: "rig file" },
+    after: Style { class: "after", name: "diagnosed" },
+    difference: "Measured − simulated",
+    enlarged: "Measured − diagnosed",
+};
+/// A reference, and the joint that follows it with two sets of parameters.
+const TRACKING: Words = Words {
+    measured: Style { class: "measured", name: "reference" },
+    before: Style { class: "before", name: "before" },
+    after: Style { class: "after", name: "after" },
+    difference: "Reference − joint",
+    enlarged: "Reference − joint after",
+};
 const NOISE: Style = Style { class: "noise", name: "±2 × noise" };
 const HELD_OUT: Style = Style { class: "held-out", name: "held out" };
 /// Bounds that are drawn for noise, in standard deviations: white noise is inside for 95 of 100 samples.
@@ -77,7 +100,28 @@ struct Strip<'t> {
 
 fn figure(findings: &Findings, trace: &Trace, time: &Axis) -> Markup {
     let name = names::channel(&trace.channel);
-    let caption = html! { figcaption { (name) " " code { (trace.channel) } } };
+    let caption = html! { (name) " " code { (trace.channel) } };
+    let noise = findings.diagnosis.fit.channels.get(&trace.channel).map(|rmse| rmse.noise_rmse);
+    let onsets = onsets(findings, trace, time);
+    lines(trace, time, &SIMULATION, &caption, noise, &onsets)
+}
+
+/// Figure of a reference (`measured`) and a joint that follows it with the old (`before`) and the new parameters (`after`).
+pub(super) fn tracking(trace: &Trace, caption: &str) -> Markup {
+    let Some((from_s, to_s)) = axis::range(trace.t_s.iter().copied()) else { return html! {} };
+    lines(trace, &Axis::exact(from_s, to_s, 10), &TRACKING, &html! { (caption) }, None, &[])
+}
+
+fn lines(
+    trace: &Trace,
+    time: &Axis,
+    words: &Words,
+    caption: &Markup,
+    noise: Option<f64>,
+    onsets: &[(f64, &str)],
+) -> Markup {
+    let name = names::channel(&trace.channel);
+    let caption = html! { figcaption { (caption) } };
     let n = [trace.t_s.len(), trace.measured.len(), trace.before.len(), trace.after.len()];
     let n = n.into_iter().min().unwrap_or(0);
     if n == 0 {
@@ -87,10 +131,8 @@ fn figure(findings: &Findings, trace: &Trace, time: &Axis) -> Markup {
         trace.measured.iter().zip(simulated).map(|(measured, simulated)| measured - simulated).collect()
     };
     let (rest_before, rest_after) = (rest(&trace.before), rest(&trace.after));
-    let noise = findings.diagnosis.fit.channels.get(&trace.channel).map(|rmse| rmse.noise_rmse);
     let noise = noise.filter(|noise| noise.is_finite() && *noise > 0.0);
-    let onsets = onsets(findings, trace, time);
-    let strips = strips(trace, &rest_before, &rest_after, noise, onsets.len());
+    let strips = strips(trace, &rest_before, &rest_after, words, noise, onsets.len());
 
     let foot = strips.iter().fold(0.0, |foot, strip| foot + HEADING + strip.height);
     let tops = strips.iter().scan(0.0, |next, strip| {
@@ -105,12 +147,11 @@ fn figure(findings: &Findings, trace: &Trace, time: &Axis) -> Markup {
             svg viewBox=(format!("0 0 {WIDTH} {height}")) role="img" {
                 title { (name) " over time" }
                 desc {
-                    "Measured, simulated with the rig file, and simulated with the diagnosed physics, from "
-                    (figures::seconds(time.low)) " to " (figures::seconds(time.high))
-                    "; below it what measurement and simulation differ by."
+                    (names::words(words.measured.name)) ", " (words.before.name) " and " (words.after.name) ", from "
+                    (figures::seconds(time.low)) " to " (figures::seconds(time.high)) "; below it: " (words.difference) "."
                 }
                 @for (strip, top) in strips.iter().zip(tops) { (draw(strip, trace, time, top)) }
-                (draw_onsets(&onsets, time, HEADING, foot))
+                (draw_onsets(onsets, time, HEADING, foot))
                 (time_labels(time, foot))
             }
         }
@@ -135,6 +176,7 @@ fn strips<'t>(
     trace: &'t Trace,
     rest_before: &'t [f64],
     rest_after: &'t [f64],
+    words: &Words,
     noise: Option<f64>,
     onsets: usize,
 ) -> Vec<Strip<'t>> {
@@ -148,7 +190,8 @@ fn strips<'t>(
     let in_room = |series: &'t [f64], which: usize| {
         series.iter().map(move |value| room.map_or(*value, |room| value.clamp(room[which].0, room[which].1)))
     };
-    let note = if room.is_some() { "; rig file leaves the scale" } else { "" };
+    let note =
+        if room.is_some() { format!("; {} leaves the scale", words.before.name) } else { String::new() };
 
     let signal = Axis::around(all([&trace.measured, &trace.after]).chain(in_room(&trace.before, 0)), 7);
     // Names of onsets stand above the lines, not on them.
@@ -162,16 +205,20 @@ fn strips<'t>(
 
     let mut strips = vec![
         Strip {
-            heading: heading("Signal", &signal) + note,
-            series: vec![(MEASURED, &trace.measured), (AFTER, &trace.after), (BEFORE, &trace.before)],
+            heading: heading("Signal", &signal) + &note,
+            series: vec![
+                (words.measured, &trace.measured),
+                (words.after, &trace.after),
+                (words.before, &trace.before),
+            ],
             axis: signal,
             is_residual: false,
             noise: None,
             height: SIGNAL_HEIGHT + above,
         },
         Strip {
-            heading: heading("Measured − simulated", &difference) + note,
-            series: vec![(BEFORE, rest_before), (AFTER, rest_after)],
+            heading: heading(words.difference, &difference) + &note,
+            series: vec![(words.before, rest_before), (words.after, rest_after)],
             axis: difference,
             is_residual: true,
             noise: noise.filter(|_| !is_enlarged),
@@ -180,8 +227,8 @@ fn strips<'t>(
     ];
     if is_enlarged {
         strips.push(Strip {
-            heading: heading(&format!("Measured − diagnosed, enlarged {times:.0} times"), &enlarged),
-            series: vec![(AFTER, rest_after)],
+            heading: heading(&format!("{}, enlarged {times:.0} times", words.enlarged), &enlarged),
+            series: vec![(words.after, rest_after)],
             axis: enlarged,
             is_residual: true,
             noise,
@@ -224,13 +271,14 @@ fn key(strip: &Strip, has_held_out: bool, y: f64) -> Markup {
     const ENTRY: f64 = 108.0;
     let mut entries: Vec<Style> = strip.series.iter().map(|(style, _)| *style).collect();
     // As the story goes, not as the lines are stacked.
-    entries.sort_by_key(|style| [MEASURED, BEFORE, AFTER].iter().position(|s| s.name == style.name));
+    entries
+        .sort_by_key(|style| ["measured", "before", "after"].iter().position(|class| *class == style.class));
     entries.extend(strip.noise.map(|_| NOISE));
     entries.extend(has_held_out.then_some(HELD_OUT));
     let start = RIGHT - ENTRY * entries.len() as f64;
     html! { @for (i, style) in entries.iter().enumerate() {
         @let x = start + ENTRY * i as f64;
-        @if style.name == HELD_OUT.name {
+        @if style.class == HELD_OUT.class {
             rect class=(style.class) x=(px(x)) y=(px(y - 6.0)) width="28" height="12" {}
         } @else {
             line class=(style.class) x1=(px(x)) x2=(px(x + 28.0)) y1=(px(y)) y2=(px(y)) {}

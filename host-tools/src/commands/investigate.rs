@@ -1,0 +1,138 @@
+//! `bowden investigate`: the whole round on a joint by itself: excite, diagnose, correct, verify.
+
+use std::fs;
+use std::io::{self, BufRead, IsTerminal};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use super::print;
+use crate::interrupt;
+use crate::investigate::plan::Wishes;
+use crate::investigate::{Ask, Setup, investigate};
+use crate::link::PortArguments;
+use crate::outcome::{Failure, Outcome};
+use crate::output;
+use crate::progress::{Progress, UntilInterrupted};
+use crate::rig::Rig;
+
+/// Time between two looks whether the user pressed Ctrl-C instead of answering.
+const LOOK_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Arguments of `bowden investigate`.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Shows the references and their limits and asks before the joint moves, shows old and new parameters and \
+                  asks before they are set. They last until the board is switched off. If the joint then follows worse, or a \
+                  fault stops it, the old ones are put back. Ctrl-C at any moment: the joint is off, what was recorded is \
+                  kept."
+)]
+pub struct InvestigateArguments {
+    #[command(flatten)]
+    port: PortArguments,
+    /// Rig file: what the bench is believed to be
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// Folder for recordings, diagnoses, investigation.json and investigate.html; new or empty
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    wishes: Wishes,
+    /// Format of the recordings
+    #[arg(long, value_name = "FORMAT", default_value = "csv", value_parser = ["csv", "csv.gz", "mcap"])]
+    format: String,
+    /// Record every N-th control tick
+    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    every: u64,
+    /// Do not ask
+    #[arg(long)]
+    yes: bool,
+    /// Show references and limits; move nothing, write nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// Says yes to everything.
+struct Yes;
+
+impl Ask for Yes {
+    fn may(&self, _question: &str) -> Result<bool, Failure> {
+        Ok(true)
+    }
+}
+
+/// Asks the person at the terminal.
+struct AtTerminal;
+
+impl Ask for AtTerminal {
+    fn may(&self, question: &str) -> Result<bool, Failure> {
+        print(&format!("{question} [y/N] "))?;
+        // Reading a line cannot be interrupted, so another thread does it and this one looks for Ctrl-C.
+        let (sender, answer) = mpsc::channel();
+        std::thread::spawn(move || {
+            let mut line = String::new();
+            let read = io::stdin().lock().read_line(&mut line).map(|_| line);
+            let _ = sender.send(read);
+        });
+        loop {
+            if interrupt::requested() {
+                print("\n")?;
+                return Err(Failure::failed("stopped by the user"));
+            }
+            match answer.recv_timeout(LOOK_INTERVAL) {
+                Ok(Ok(line)) => return Ok(matches!(line.trim().to_lowercase().as_str(), "y" | "yes")),
+                Ok(Err(error)) => {
+                    let reason = output::describe(&error);
+                    return Err(Failure::failed(format!(
+                        "standard input: cannot be read: {reason}; use --yes"
+                    )));
+                }
+                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(mpsc::RecvTimeoutError::Disconnected) => return Ok(false),
+            }
+        }
+    }
+}
+
+impl InvestigateArguments {
+    /// Investigates the joint.
+    ///
+    /// # Errors
+    /// As [`investigate`]; also exit status 2 if nobody can be asked, or the folder holds something.
+    pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
+        let ask: &dyn Ask = if self.yes || self.dry_run { &Yes } else { &AtTerminal };
+        if !self.yes && !self.dry_run && !io::stdin().is_terminal() {
+            return Err(Failure::bad_input(
+                "investigate moves the joint, and there is no terminal to ask at; nothing was moved; say --yes, or --dry-run to \
+                 see what it would do",
+            ));
+        }
+        Rig::load(&self.rig)?;
+        output::check_folder(&self.out)?;
+        refuse_content(&self.out)?;
+        interrupt::catch()?;
+        let client = self.port.connect()?;
+        let setup = Setup {
+            rig: &self.rig,
+            folder: &self.out,
+            wishes: self.wishes,
+            ending: &self.format,
+            every: self.every,
+            dry_run: self.dry_run,
+        };
+        investigate(&setup, client, ask, &interrupt::requested, &UntilInterrupted(progress))
+    }
+}
+
+/// Refuses a folder with anything in it: an earlier investigation must not be mixed with this one.
+fn refuse_content(folder: &Path) -> Result<(), Failure> {
+    let first = fs::read_dir(folder).ok().and_then(|mut entries| entries.next()).and_then(Result::ok);
+    match first {
+        None => Ok(()),
+        Some(entry) => Err(Failure::bad_input(format!(
+            "{}: holds {} already; name a new folder, or remove what is in it",
+            folder.display(),
+            entry.file_name().to_string_lossy()
+        ))),
+    }
+}

@@ -1,0 +1,108 @@
+//! What an investigation says: the content of `investigation.json`, schema `bowden-investigation/1`, and of its page.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::changes::{Changes, State};
+use super::driver::Recorded;
+use super::plan::Plan;
+use super::rounds::Round;
+use super::verification::Verification;
+use super::words;
+use crate::link::ParameterSet;
+use crate::outcome::Failure;
+use crate::output;
+
+/// Value of `schema`.
+pub const SCHEMA: &str = "bowden-investigation/1";
+
+/// Numbers of an investigation, in its folder.
+pub const RESULT: &str = "investigation.json";
+
+/// Report of an investigation, in its folder.
+pub const PAGE: &str = "investigate.html";
+
+/// One investigation, as far as it came.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Investigation {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// Name of the rig.
+    pub rig: String,
+    /// What the board calls itself.
+    pub board: String,
+    /// What was to be done.
+    pub plan: Plan,
+    /// Recordings, in the order in which they were made.
+    pub recordings: Vec<Recorded>,
+    /// Diagnoses, the last one counts.
+    pub rounds: Vec<Round>,
+    /// What changes on the board.
+    pub parameters: Option<Changes>,
+    /// Tracking error.
+    pub verification: Option<Verification>,
+    /// Why it ended early; `None` if it did not.
+    pub stopped: Option<String>,
+    /// Program and version that wrote this.
+    pub written_by: String,
+}
+
+impl Investigation {
+    /// One in which nothing was done yet.
+    pub fn new(rig: &str, parameters: &ParameterSet, plan: Plan) -> Self {
+        Self {
+            schema: SCHEMA,
+            rig: rig.to_owned(),
+            board: parameters.board(),
+            plan,
+            recordings: Vec::new(),
+            rounds: Vec::new(),
+            parameters: None,
+            verification: None,
+            stopped: None,
+            written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
+        }
+    }
+
+    /// What became of the board's parameters, and of the tracking error, in one or two sentences.
+    pub fn conclusion(&self) -> String {
+        if let Some(stopped) = &self.stopped {
+            return format!("Ended early: {stopped}.");
+        }
+        let tracking = self.verification.as_ref().map(Verification::in_words);
+        let Some(Changes { state, changes, .. }) = &self.parameters else {
+            return "Not finished.".to_owned();
+        };
+        let count = words::parameters(changes.len());
+        let parameters = match state {
+            State::Unchanged => "No parameter of the board changes".to_owned(),
+            State::Declined => format!("{count} would change; declined, nothing was set"),
+            State::Set => {
+                format!("{count} set until the board is switched off; `bowden params store` keeps them")
+            }
+            State::Restored => {
+                "The joint followed worse with the new parameters: the board has its old ones again"
+                    .to_owned()
+            }
+        };
+        tracking.map_or_else(|| format!("{parameters}."), |tracking| format!("{parameters}; {tracking}."))
+    }
+
+    /// Writes numbers and page; returns where the page is.
+    ///
+    /// # Errors
+    /// When the medium refuses.
+    pub fn save(&self, folder: &Path) -> Result<PathBuf, Failure> {
+        let result = folder.join(RESULT);
+        let json = serde_json::to_string_pretty(self)
+            .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
+        output::write_file(&result, |file| writeln!(file, "{json}"))?;
+        let page = folder.join(PAGE);
+        output::write_file(&page, |file| {
+            file.write_all(crate::report::render_investigation(self).as_bytes())
+        })?;
+        Ok(page)
+    }
+}
