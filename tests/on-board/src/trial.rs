@@ -28,7 +28,7 @@ pub enum SheathCourse {
     /// Wrap angles of both sheaths \[rad\] over the time since the run began \[s\].
     Along(fn(f64) -> [f64; 2]),
     /// At random, as in section 5.2 of the paper.
-    Random(SheathMotion),
+    Random(Box<SheathMotion>),
 }
 
 impl SheathCourse {
