@@ -1,8 +1,32 @@
 //! `cargo xtask bench`: figures for speed and accuracy, on the machine at hand and on the emulated board.
 
+use std::ffi::OsString;
+
+use clap::Args;
+
 use crate::parts::Parts;
-use crate::process::{self, built, cargo};
+use crate::process::{self, built, cargo, target_folder, workspace};
+use crate::prove::provenance;
 use crate::{cross_target, firmware, system_packages};
+
+/// Which benchmarks are run.
+#[derive(Debug, Args)]
+pub struct Options {
+    #[command(flatten)]
+    parts: Parts,
+    /// Instead, measure what each correction of the board gains, and write host-tools/docs/corrections.md
+    #[arg(long, conflicts_with_all = ["host", "board"])]
+    corrections: bool,
+    /// With --corrections: only effects whose names contain one of these; no page is written then
+    #[arg(value_name = "EFFECT", requires = "corrections")]
+    effects: Vec<OsString>,
+    /// With --corrections: without diagnoses, in minutes; no page is written then
+    #[arg(long, requires = "corrections")]
+    undiagnosed: bool,
+}
+
+/// Page of the corrections, below the workspace.
+const CORRECTIONS: &str = "host-tools/docs/corrections.md";
 
 /// Benchmarks: package, target, and what its figures say.
 const BENCHES: [(&str, &str, &str); 3] = [
@@ -23,7 +47,11 @@ const BENCHES: [(&str, &str, &str); 3] = [
 ///
 /// # Errors
 /// When one cannot be built or fails.
-pub fn run(parts: Parts) -> Result<(), String> {
+pub fn run(options: &Options) -> Result<(), String> {
+    if options.corrections {
+        return corrections(options);
+    }
+    let parts = options.parts;
     if parts.host() {
         host()?;
     }
@@ -40,12 +68,35 @@ fn host() -> Result<(), String> {
 
 fn board() -> Result<(), String> {
     println!("\n== the board: release images on the emulated processor; its cycles are a lower bound");
+    on_board("on-board-figures", &[])
+}
+
+fn corrections(options: &Options) -> Result<(), String> {
+    println!(
+        "\n== corrections: the release image on the emulated board, RMS error; control code alone in brackets"
+    );
+    let mut arguments = vec![target_folder()?.join("corrections").into_os_string()];
+    if options.undiagnosed {
+        arguments.push("--undiagnosed".into());
+    } else if options.effects.is_empty() {
+        let page = workspace().join(CORRECTIONS).into_os_string();
+        arguments.extend(["--page".into(), page, "--provenance".into(), provenance().into()]);
+    }
+    arguments.extend(options.effects.iter().cloned());
+    on_board("on-board-corrections", &arguments)
+}
+
+/// Builds the images, the tool and the program `name` that runs them on the emulated board, and runs it.
+///
+/// # Errors
+/// When something cannot be built, or the program fails.
+pub fn on_board(name: &str, arguments: &[OsString]) -> Result<(), String> {
     system_packages::ensure()?;
     cross_target::ensure()?;
     let images = firmware::build()?;
     process::run(&mut cargo(&["build", "--quiet", "--release", "--package", "bowden"]), &[0])?;
-    let figures = ["--package", "bowden-on-board-tests", "--bin", "on-board-figures"];
-    let mut figures = cargo(&[&["run", "--quiet", "--release"], figures.as_slice()].concat());
-    firmware::announce(&images, &mut figures);
-    process::run(figures.env("BOWDEN_BIN", built("release", "bowden")?), &[0])
+    let program = ["--package", "bowden-on-board-tests", "--bin", name, "--"];
+    let mut program = cargo(&[&["run", "--quiet", "--release"], program.as_slice()].concat());
+    firmware::announce(&images, &mut program);
+    process::run(program.args(arguments).env("BOWDEN_BIN", built("release", "bowden")?), &[0])
 }

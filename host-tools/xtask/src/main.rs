@@ -42,7 +42,7 @@ enum Task {
     /// Run all tests, those of the board's images on the emulated board among them
     Test(Parts),
     /// Run all benchmarks: speed of model and bench, gain of the motion reconstruction, cost on the board
-    Bench(Parts),
+    Bench(bench::Options),
     /// Hide effects in simulated rigs and count how often `bowden diagnose` finds them; `prove --help` lists options
     Prove(prove::Options),
     /// Run the experiments of the paper on the virtual bench and write host-tools/docs/paper.md; `paper --help` lists options
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(Cli { task: Task::Demo }) => demo::run(),
         Ok(Cli { task: Task::Test(parts) }) => test::run(parts),
-        Ok(Cli { task: Task::Bench(parts) }) => bench::run(parts),
+        Ok(Cli { task: Task::Bench(options) }) => bench::run(&options),
         Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
         Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
