@@ -6,6 +6,7 @@ use std::process::Command;
 
 use clap::Args;
 
+use crate::bench;
 use crate::process::{self, built, cargo, workspace};
 use crate::prove::provenance;
 
@@ -13,6 +14,10 @@ use crate::prove::provenance;
 #[derive(Debug, Args)]
 #[command(disable_help_flag = true)]
 pub struct Options {
+    /// Instead, run one experiment of each kind with the release image on the emulated board too, and print the figures of
+    /// both sides; comes first
+    #[arg(long)]
+    board: bool,
     /// Options of the experiments; --help lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
     handed_on: Vec<OsString>,
@@ -26,6 +31,12 @@ const PAGE: &str = "host-tools/docs/paper.md";
 /// # Errors
 /// When it cannot be built, or an experiment fails.
 pub fn run(options: &Options) -> Result<(), String> {
+    if options.board {
+        return bench::on_board("on-board-paper", &[]);
+    }
+    if options.handed_on.iter().any(|option| option == "--board") {
+        return Err("--board comes first: `cargo xtask paper --board`".to_owned());
+    }
     process::run(&mut cargo(&["build", "--release", "--package", "bowden-paper", "--bin", "paper"]), &[0])?;
     let mut command = experiments(&options.handed_on, &built("release", "paper")?);
     process::run(&mut command, &[0])
@@ -43,6 +54,12 @@ fn experiments(options: &[OsString], program: &Path) -> Command {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_late_board_is_refused_in_one_line() {
+        let options = Options { board: false, handed_on: vec!["--beyond".into(), "--board".into()] };
+        assert!(run(&options).unwrap_err().starts_with("--board comes first"));
+    }
 
     #[test]
     fn what_the_user_gives_comes_after_the_page_of_the_workspace() {

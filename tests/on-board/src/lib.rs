@@ -13,6 +13,7 @@ pub mod course;
 pub mod host;
 pub mod image;
 pub mod load;
+pub mod paper;
 pub mod telemetry;
 pub mod ticks;
 pub mod tool;
