@@ -6,8 +6,8 @@
 //! `theta_c -= c (d_T/T_r) y`, `y = T_s s/((1 + T_s s)(1 + T_r s)) T_in`, `c = L/(2 EA r1²)`, `d_T` = `controller.tension_damping`.
 //!
 //! `c T_in` is the stretch of the tendons. The band-pass has its middle at 4.1 Hz, where it has no lag; the position loop, a
-//! quarter of a period late there with a bandwidth of 6 Hz, makes the yielding a damping. Derivation and damping ratio:
-//! `docs/sheath-observer.md`.
+//! quarter of a period late there with a bandwidth of 6 Hz, makes the yielding a damping of loads that ring between 2.2
+//! and 11 Hz. Derivation and damping ratio: `docs/sheath-observer.md`.
 
 use crate::parameters::Parameters;
 use crate::scale::{Angle, Gain, Sum, Torque, Weight};
