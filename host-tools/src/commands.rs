@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::study::Study;
 
 /// Writes a result to standard output. A reader that left early (`bowden check ... | head -1`) is no failure.
 ///
@@ -35,9 +35,20 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Loads recordings that are to be compared with a rig.
-fn load_recordings(rig: &Rig, paths: &[PathBuf]) -> Result<Vec<Recording>, Failure> {
-    paths.iter().map(|path| rig.load_recording(path)).collect()
+/// The study that a command line names: a study file, or recordings with the rig of their bench.
+fn load_study(recordings: &[PathBuf], rig: Option<&Path>, heldout: &[PathBuf]) -> Result<Study, Failure> {
+    match (recordings.iter().find(|path| Study::is_named_by(path)), rig) {
+        (None, Some(rig)) => Study::of_one_bench(rig, recordings, heldout),
+        (None, None) => Err(Failure::bad_input(
+            "no rig; name it with --rig RIG.toml, or give one study file (.toml) instead",
+        )),
+        (Some(study), None) if recordings.len() == 1 && heldout.is_empty() => Study::load(study),
+        (Some(study), _) => Err(Failure::bad_input(format!(
+            "{}: a study names its rigs and recordings itself; leave out --rig, --heldout and other recordings, or give \
+             recordings (.csv, .csv.gz, .mcap) in place of it",
+            study.display()
+        ))),
+    }
 }
 
 /// Outcome of work on recordings: what was lost or repaired when they were read.

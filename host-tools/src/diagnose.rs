@@ -26,14 +26,15 @@ use std::collections::BTreeMap;
 
 use bowden_model::effect::ActiveEffect;
 
-use crate::fit::free::{Place, recalibrated};
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
+use crate::fit::variation::Variation;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 use crate::recording::Recording;
-use crate::rig::{Rig, RigDocument};
+use crate::rig::{Rig, RigDocument, RigParameter};
+use crate::study::Study;
 use afterwards::afterwards;
 pub use experiment::Experiment;
 use experiment::Shown;
@@ -70,24 +71,42 @@ pub struct Diagnosed {
     pub findings: Findings,
     /// Motions that would part the named effects from those that could not be excluded.
     pub experiments: Vec<Experiment>,
-    /// The bench after the recordings.
-    now: JointModel,
-    /// Effects of `now` that the rig stated itself; they come first.
-    own: usize,
+    /// Every bench after its recordings.
+    now: Vec<BenchNow>,
+}
+
+/// A bench after its recordings.
+#[derive(Clone, Debug)]
+struct BenchNow {
+    joint: JointModel,
+    /// Effects that the rig stated itself; they come first.
+    stated_effects: usize,
+    /// Parameters that the fit may have moved.
+    fitted: Vec<RigParameter>,
 }
 
 impl Diagnosed {
-    /// Writes the diagnosed physics into a rig file: the bench as it is after the recordings.
+    /// Writes the diagnosed physics into the rig file of a bench: the bench as it is after its recordings.
     ///
     /// # Errors
     /// When the file cannot take a value.
-    pub fn write_into(&self, document: &mut RigDocument) -> Result<(), Failure> {
-        for free in recalibrated(&self.now) {
-            if let Place::Nominal(parameter) = free.place() {
-                document.set_nominal(parameter.section, parameter.spec.name, free.start())?;
+    pub fn write_into(&self, bench: usize, document: &mut RigDocument) -> Result<(), Failure> {
+        let Some(BenchNow { joint, stated_effects, fitted }) = self.now.get(bench) else { return Ok(()) };
+        for parameter in fitted {
+            match (parameter, joint.value(parameter)) {
+                (RigParameter::Nominal(parameter), Some(value)) => {
+                    document.set_nominal(parameter.section, parameter.spec.name, value)?;
+                }
+                (RigParameter::Effect { descriptor, .. }, Some(_)) => {
+                    let stated = joint.effects[..*stated_effects].iter();
+                    stated
+                        .filter(|effect| effect.descriptor().id == descriptor.id)
+                        .try_for_each(|effect| document.add_effect(effect))?;
+                }
+                _ => {}
             }
         }
-        self.now.effects[self.own..].iter().try_for_each(|effect| document.add_effect(effect))
+        joint.effects[*stated_effects..].iter().try_for_each(|effect| document.add_effect(effect))
     }
 }
 
@@ -107,45 +126,89 @@ pub fn diagnose(
         training.first().ok_or_else(|| Failure::bad_input("no recording to diagnose; name at least one"))?;
     let model = JointModel::from_rig(rig, first)?;
     let objective = Objective::new(&model, training, heldout, heldout.is_empty())?;
-    let search = JointModel {
-        elements: model.elements.min(search_elements(&model)),
-        step_s: model.step_s.max(SEARCH_STEP_S),
-        ..model.clone()
+    let whole = Variation::new(model.clone(), 0, &model, Vec::new(), Vec::new());
+    let [training, heldout] = [training, heldout].map(|recordings| recordings.iter().collect());
+    let case = Case {
+        rig,
+        name: &rig.name,
+        training,
+        heldout,
+        objective: &objective,
+        model: &model,
+        benches: vec![(&rig.name, whole)],
     };
-    let mut selected = select(&objective, &search, asked, progress)?;
-    let before = Stage::of(&objective, &model)?;
-    progress.stage("refining", 0);
-    let rounds: &[f64] = if selected.complete { &[FINE_STEP] } else { &[] };
-    let refined = |found: &JointModel| refine(&objective, &model, &at_full_resolution(found, &model), rounds);
-    let mut last = refined(&selected.model)?;
-    let recalibrated = Stage::of(&objective, &at_full_resolution(&selected.baseline.model, &model))?;
-    if selected.complete
-        && !selected.chosen.is_empty()
-        && !pays(recalibrated.heldout_loss(&objective), objective.mean_loss(&last.residuals, Part::HeldOut))
-    {
-        selected = selected.withdrawn();
-        last = refined(&selected.model)?;
-    }
-    let mut inconstant = None;
-    if selected.chosen.is_empty() {
-        inconstant = constancy::inconstant(&objective, &before.residuals, &last.residuals);
-        if inconstant.is_some() {
-            last = refine(&objective, &model, &model, &[])?;
+    case.diagnosed(asked, progress)
+}
+
+/// Diagnoses the recordings of a study together. Effects that are tried on request only are tried if they are among `asked`.
+///
+/// # Errors
+/// When a recording cannot drive its rig, or nothing can be compared.
+pub fn diagnose_study(study: &Study, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
+    let model = study.joint()?;
+    let training: Vec<&Recording> = study.recordings_where(false).collect();
+    let heldout: Vec<&Recording> = study.recordings_where(true).collect();
+    let objective = Objective::of(&model, study.observed(&model)?, heldout.is_empty())?;
+    let benches: Result<Vec<(&String, Variation)>, Failure> = study
+        .benches
+        .iter()
+        .enumerate()
+        .map(|(index, bench)| Ok((&bench.name, study.variation_of_bench(index, &model)?)))
+        .collect();
+    let case = Case {
+        rig: &study.benches[0].rig,
+        name: &study.name,
+        training,
+        heldout,
+        objective: &objective,
+        model: &model,
+        benches: benches?,
+    };
+    case.diagnosed(asked, progress)
+}
+
+impl Case<'_> {
+    /// The whole diagnosis.
+    fn diagnosed(&self, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
+        let Self { objective, model, .. } = *self;
+        let search = JointModel {
+            elements: model.elements.min(search_elements(model)),
+            step_s: model.step_s.max(SEARCH_STEP_S),
+            ..model.clone()
+        };
+        let mut selected = select(objective, &search, asked, progress)?;
+        let before = Stage::of(objective, model)?;
+        progress.stage("refining", 0);
+        let rounds: &[f64] = if selected.complete { &[FINE_STEP] } else { &[] };
+        let refined =
+            |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
+        let mut last = refined(&selected.model)?;
+        let recalibrated = Stage::of(objective, &at_full_resolution(&selected.baseline.model, model))?;
+        if selected.complete
+            && !selected.chosen.is_empty()
+            && !pays(
+                recalibrated.heldout_loss(objective),
+                objective.mean_loss(&last.residuals, Part::HeldOut),
+            )
+        {
+            selected = selected.withdrawn();
+            last = refined(&selected.model)?;
         }
+        let mut inconstant = None;
+        if selected.chosen.is_empty() {
+            inconstant = constancy::inconstant(objective, &before.residuals, &last.residuals);
+            if inconstant.is_some() {
+                last = refine(objective, model, model, &[])?;
+            }
+        }
+        let unexplained = match inconstant {
+            Some(inconstant) => Some(inconstant),
+            None => unexplained::unexplained(objective, &selected.searched)?,
+        };
+        let stages = Stages { before, recalibrated, after: Stage::of(objective, &last.model)? };
+        let traces = stages::traces(objective, model, &last.model)?;
+        Ok(self.report(&selected, &last, &stages, unexplained, traces))
     }
-    let unexplained = match inconstant {
-        Some(inconstant) => Some(inconstant),
-        None => unexplained::unexplained(&objective, &selected.searched)?,
-    };
-    let stages = Stages { before, recalibrated, after: Stage::of(&objective, &last.model)? };
-    let traces = stages::traces(&objective, &model, &last.model)?;
-    Ok(Case { rig, training, heldout, objective: &objective, model: &model }.report(
-        &selected,
-        &last,
-        &stages,
-        unexplained,
-        traces,
-    ))
 }
 
 /// Whether the diagnosed rig, which stands without what is ordinary, predicts held-out data better than the recalibrated one.
@@ -163,11 +226,17 @@ fn search_elements(model: &JointModel) -> usize {
 
 /// What a diagnosis is about.
 struct Case<'a> {
+    /// Rig of the first bench.
     rig: &'a Rig,
-    training: &'a [Recording],
-    heldout: &'a [Recording],
+    /// Name in the report.
+    name: &'a str,
+    training: Vec<&'a Recording>,
+    heldout: Vec<&'a Recording>,
     objective: &'a Objective,
+    /// The joint that all recordings share, as the first rig states it.
     model: &'a JointModel,
+    /// Names of the benches, and what turns the shared joint into each.
+    benches: Vec<(&'a String, Variation)>,
 }
 
 fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
@@ -186,6 +255,15 @@ fn refine(
 }
 
 impl Case<'_> {
+    /// A bench after its recordings, whose diagnosed joint is a variation of `diagnosed`.
+    fn now(&self, bench: &Variation, diagnosed: &JointModel, clock_s: f64) -> BenchNow {
+        let joint = bench.apply(diagnosed);
+        let stated_effects = bench.base().effects.len();
+        let calibrated = Layout::of(self.model).calibrated(self.model);
+        let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
+        BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted }
+    }
+
     fn report(
         &self,
         selected: &Selected,
@@ -194,13 +272,15 @@ impl Case<'_> {
         unexplained: Option<Unexplained>,
         traces: Vec<Trace>,
     ) -> Diagnosed {
-        let Self { rig, training, heldout, objective, model } = *self;
-        let nominal = recalibrated(model);
+        let Self { rig, objective, model, .. } = *self;
+        let (training, heldout) = (&self.training, &self.heldout);
+        let nominal = Layout::of(model).calibrated(model);
         let recalibrated_parameters: Vec<Recalibrated> = nominal
             .iter()
             .zip(&last.values)
             .zip(&last.stds)
             .map(|((free, value), std)| Recalibrated {
+                bench: free.bench(model).map(|bench| self.benches[bench].0.clone()),
                 parameter: free.path(model),
                 nominal: free.start(),
                 fitted: *value,
@@ -212,7 +292,7 @@ impl Case<'_> {
         let own = model.effects.len();
         let clock_s = objective.duration_s();
         let mut first_value = nominal.len();
-        let shown = Shown::by(&training.iter().chain(heldout).collect::<Vec<_>>());
+        let shown = Shown::by(&training.iter().chain(heldout).copied().collect::<Vec<_>>());
         let mut experiments = Vec::new();
         let mut effects = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
@@ -226,7 +306,7 @@ impl Case<'_> {
                 Some(words)
             };
             effects.push(named(active, chosen, &last.stds[values], objective, separate));
-            first_value += count;
+            first_value += Layout::of_found(&last.model, own + index).len();
         }
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let wrong = recalibrated_parameters.iter().any(Recalibrated::is_wrong);
@@ -283,7 +363,7 @@ impl Case<'_> {
                 })
                 .collect(),
             search: selected.rounds.iter().map(search_round).collect(),
-            rig: rig.name.clone(),
+            rig: self.name.to_owned(),
             recordings: training.iter().map(|r| r.source().to_owned()).collect(),
             heldout: if heldout.is_empty() {
                 vec!["every third second of each recording".to_owned()]
@@ -295,8 +375,7 @@ impl Case<'_> {
         Diagnosed {
             findings: Findings { diagnosis, traces, regimes: place::regimes(objective, stages) },
             experiments,
-            now: afterwards(&last.model, own, clock_s),
-            own,
+            now: self.benches.iter().map(|(_, bench)| self.now(bench, &last.model, clock_s)).collect(),
         }
     }
 }

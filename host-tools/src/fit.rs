@@ -6,3 +6,4 @@ pub mod objective;
 pub mod recalibrate;
 pub mod solver;
 pub mod typical;
+pub mod variation;

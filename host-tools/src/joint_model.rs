@@ -8,7 +8,7 @@ use bowden_model::plant::{InputBoundary, OutputBoundary, PlantConfig};
 
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::rig::{Controller, Rig};
+use crate::rig::{Controller, ControllerParameter, Rig, RigParameter};
 
 /// Law of a servo that turns the error of its angle into a duty, `d = clamp(k (θ_ref - θ), ±d_max)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +19,29 @@ pub struct ServoLaw {
     pub duty_limit: f64,
     /// Time between the measurement and the duty that follows from it, s.
     pub delay_s: f64,
+}
+
+/// Shortest simulation step, s: a second of a joint that needs shorter ones takes more than a minute.
+const SHORTEST_STEP_S: f64 = 1e-7;
+
+/// A parameter with a value of its own on one bench of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnParameter {
+    /// Index of the bench.
+    pub bench: usize,
+    /// The parameter.
+    pub parameter: RigParameter,
+    /// Value on this bench; `None` before a fit has moved it: the bench's rig file decides, or the effect as it was found.
+    pub value: Option<f64>,
+}
+
+/// All parameters with values of their own on single benches.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OwnParameters {
+    /// One entry a bench and parameter.
+    pub values: Vec<OwnParameter>,
+    /// Those that every bench has for itself: the shared value means nothing.
+    pub everywhere: Vec<RigParameter>,
 }
 
 /// A joint as it is to be simulated.
@@ -44,6 +67,8 @@ pub struct JointModel {
     pub relative_inputs: Vec<Channel>,
     /// Inputs that a replay averages without phase, and over which time, s.
     pub smoothing_s: Vec<(Channel, f64)>,
+    /// Parameters with a value of their own on single benches of a study; empty for one bench.
+    pub own: OwnParameters,
 }
 
 /// How a replay drives the input side.
@@ -108,7 +133,58 @@ impl JointModel {
         output: OutputBoundary,
     ) -> Result<PlantConfig, Failure> {
         let effects = EffectSet::from_slice(&self.effects).map_err(Failure::bad_input)?;
-        PlantConfig::new(self.parameters, self.elements, effects, input, output).map_err(Failure::bad_input)
+        let plant = PlantConfig::new(self.parameters, self.elements, effects, input, output)
+            .map_err(Failure::bad_input)?;
+        let step_s = plant.stable_step_s();
+        if step_s < SHORTEST_STEP_S {
+            return Err(Failure::bad_input(format!(
+                "the simulation needs steps of {step_s:.1e} s, shorter than {SHORTEST_STEP_S:.0e} s: an inertia is too small for \
+                 the stiffness of the tendons; check mass_kg, arm_m and inertia_kg_m2 of [load], rotor_inertia_kg_m2 of \
+                 [motor] and axial_stiffness_n of [tendon]"
+            )));
+        }
+        Ok(plant)
+    }
+}
+
+impl JointModel {
+    /// Value of a parameter; `None` where the joint lacks the part or the effect. Of several instances of an effect the first counts.
+    #[must_use]
+    pub fn value(&self, parameter: &RigParameter) -> Option<f64> {
+        match parameter {
+            RigParameter::Nominal(parameter) => parameter.get(&self.parameters),
+            RigParameter::Effect { descriptor, index } => {
+                let instance = self.effects.iter().find(|active| active.descriptor().id == descriptor.id);
+                instance.map(|active| active.parameters[*index])
+            }
+            RigParameter::Controller(parameter) => self.servo.as_ref().map(|servo| match parameter {
+                ControllerParameter::Gain => servo.gain_duty_per_rad,
+                ControllerParameter::DutyLimit => servo.duty_limit,
+                ControllerParameter::Delay => servo.delay_s,
+            }),
+        }
+    }
+
+    /// Replaces the value of a parameter; does nothing where [`Self::value`] finds none.
+    pub fn set_value(&mut self, parameter: &RigParameter, value: f64) {
+        match parameter {
+            RigParameter::Nominal(parameter) => parameter.set(&mut self.parameters, value),
+            RigParameter::Effect { descriptor, index } => {
+                let is_meant = |active: &&mut ActiveEffect| active.descriptor().id == descriptor.id;
+                if let Some(active) = self.effects.iter_mut().find(is_meant) {
+                    active.parameters[*index] = value;
+                }
+            }
+            RigParameter::Controller(parameter) => {
+                if let Some(servo) = &mut self.servo {
+                    *match parameter {
+                        ControllerParameter::Gain => &mut servo.gain_duty_per_rad,
+                        ControllerParameter::DutyLimit => &mut servo.duty_limit,
+                        ControllerParameter::Delay => &mut servo.delay_s,
+                    } = value;
+                }
+            }
+        }
     }
 }
 
@@ -134,6 +210,40 @@ impl JointModel {
             free_offsets: rig.free_offsets.clone(),
             relative_inputs: rig.relative_inputs.clone(),
             smoothing_s: rig.smoothing_s.clone(),
+            own: OwnParameters::default(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_bench;
+
+    #[test]
+    fn a_joint_that_no_simulation_can_follow_is_refused() {
+        let model = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(10)).unwrap();
+        assert!(model.plant().is_ok());
+        for (parameter, value) in [("load.mass_kg", 1e-300), ("tendon.axial_stiffness_n", 1e300)] {
+            let mut stiff = model.clone();
+            stiff.set_value(&RigParameter::parse(parameter).unwrap(), value);
+            let refused = stiff.plant().unwrap_err();
+            assert!(refused.message().contains("needs steps of"), "{parameter}: {}", refused.message());
+        }
+    }
+
+    #[test]
+    fn values_are_found_and_replaced_by_their_names() {
+        let mut model = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(10)).unwrap();
+        let of = |name: &str| RigParameter::parse(name).unwrap();
+        model.set_value(&of("load.mass_kg"), 1.25);
+        assert_eq!(model.parameters.load.unwrap().mass_kg, 1.25);
+        assert_eq!(model.value(&of("load.mass_kg")), Some(1.25));
+        // Neither effect nor position loop is there.
+        for absent in ["effects.joint_backlash.gap_rad", "controller.delay_s"] {
+            let before = model.clone();
+            model.set_value(&of(absent), 0.01);
+            assert_eq!((model.value(&of(absent)), &model), (None, &before));
+        }
     }
 }

@@ -20,5 +20,6 @@ pub mod report;
 pub mod rig;
 pub mod simulate;
 pub mod simulation;
+pub mod study;
 #[cfg(test)]
 mod test_bench;

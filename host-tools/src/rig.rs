@@ -18,6 +18,7 @@
 
 mod document;
 mod effects;
+mod parameter;
 mod parse;
 mod plausible;
 mod roles;
@@ -34,6 +35,7 @@ use crate::output;
 use crate::recording::{ColumnMap, ReadOptions, Recording};
 
 pub use document::RigDocument;
+pub use parameter::{Assignment, ControllerParameter, RigParameter};
 pub use plausible::MINIMUM_SAMPLES;
 pub use roles::ReplayRoles;
 
@@ -133,8 +135,8 @@ impl Rig {
     }
 }
 
-/// Text of a rig file.
-fn read_text(path: &Path) -> Result<String, Failure> {
+/// Text of a TOML file.
+pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     let shown = path.display();
     if path.is_dir() {
         return Err(Failure::bad_input(format!("{shown}: is a folder, expected a rig file; name a file")));

@@ -76,13 +76,18 @@ fn a_fit_recovers_what_was_simulated() {
     let recording = recorded(&truth, Motion::Lab, 20.0);
     let result = recalibrate(&rig(), &[recording], &Quiet).unwrap();
     for (section, name, value) in OFF {
-        let found = result.parameters.iter().find(|p| (p.section, p.name) == (section, name)).unwrap();
+        let found = result
+            .parameters
+            .iter()
+            .find(|p| p.parameter.to_string() == format!("{section}.{name}"))
+            .unwrap();
         let error = found.fitted / value - 1.0;
         assert!(error.abs() < 0.03, "{section}.{name}: {} for {value}", found.fitted);
         assert!(!found.at_bound && found.std.is_some_and(|std| std > 0.0), "{found:?}");
     }
     // What was right stays right.
-    let resistance = result.parameters.iter().find(|p| p.name == "resistance_ohm").unwrap();
+    let resistance =
+        result.parameters.iter().find(|p| p.parameter.to_string() == "motor.resistance_ohm").unwrap();
     assert!((resistance.fitted / 2.0 - 1.0).abs() < 0.03, "{resistance:?}");
     for channel in &result.channels {
         assert!(channel.after <= channel.before * 1.01, "{channel:?} became worse");
@@ -113,7 +118,8 @@ fn a_joint_that_does_not_move_tells_nothing_on_friction() {
     for name in ["sheath.friction_coefficient", "motor.resistance_ohm", "load.viscous_nm_s_per_rad"] {
         assert!(result.unseen.iter().any(|unseen| unseen == name), "{name} not in {:?}", result.unseen);
     }
-    let friction = result.parameters.iter().find(|p| p.name == "friction_coefficient").unwrap();
+    let friction =
+        result.parameters.iter().find(|p| p.parameter.to_string() == "sheath.friction_coefficient").unwrap();
     assert!((friction.fitted - 0.12).abs() < 1e-3, "nothing to learn from, yet {friction:?}");
 }
 

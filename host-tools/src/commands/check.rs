@@ -1,17 +1,18 @@
 //! `bowden check`: reads recordings, and a rig, as the other commands would, and says what they hold.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{outcome_of, print};
+use super::{load_study, outcome_of, print};
 use crate::outcome::{Failure, Outcome};
 use crate::recording::{Column, ReadOptions, Recording};
 use crate::rig::Rig;
+use crate::study::Study;
 
 /// Arguments of `bowden check`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CheckArguments {
-    /// Recordings to read (.csv, .csv.gz, .mcap)
+    /// Recordings to read (.csv, .csv.gz, .mcap), or one study (.toml)
     #[arg(required_unless_present = "rig")]
     recordings: Vec<PathBuf>,
     /// Rig file whose column names, units and parts the recordings are held against
@@ -25,6 +26,13 @@ impl CheckArguments {
     /// # Errors
     /// What makes a file unusable.
     pub fn run(&self) -> Result<Outcome, Failure> {
+        if let [only] = &self.recordings[..]
+            && Study::is_named_by(only)
+        {
+            let study = load_study(&self.recordings, self.rig.as_deref(), &[])?;
+            print(&describe_study(only, &study)?)?;
+            return Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)));
+        }
         let rig = self.rig.as_deref().map(Rig::load).transpose()?;
         let mut text = String::new();
         if let (Some(rig), Some(path)) = (&rig, &self.rig) {
@@ -56,6 +64,41 @@ impl CheckArguments {
         print(&text)?;
         Ok(outcome)
     }
+}
+
+/// Benches and recordings of a study, one line each.
+fn describe_study(path: &Path, study: &Study) -> Result<String, Failure> {
+    let mut text = format!(
+        "{}: study `{}`, benches: {}, recordings: {}\n",
+        path.display(),
+        study.name,
+        study.benches.len(),
+        study.recordings.len()
+    );
+    let joint = study.joint()?;
+    for (index, bench) in study.benches.iter().enumerate() {
+        let own: Vec<String> = joint
+            .own
+            .values
+            .iter()
+            .filter(|own| own.bench == index)
+            .map(|own| own.parameter.to_string())
+            .collect();
+        let own =
+            if own.is_empty() { "nothing of its own".to_owned() } else { format!("own: {}", own.join(", ")) };
+        let _ = writeln!(text, "bench `{}`: rig `{}`, {own}", bench.name, bench.rig.name);
+        for listed in study.recordings.iter().filter(|listed| listed.bench == index) {
+            let _ = write!(text, "  {}", describe(&listed.recording));
+            if listed.heldout {
+                text.push_str("; held out");
+            }
+            for assignment in &listed.set {
+                let _ = write!(text, "; {} = {}", assignment.parameter, assignment.value);
+            }
+            text.push('\n');
+        }
+    }
+    Ok(text)
 }
 
 fn describe(recording: &Recording) -> String {

@@ -6,28 +6,34 @@ use std::path::{Path, PathBuf};
 
 use bowden_model::effects::CATALOGUE;
 
-use super::{all_paths, load_recordings, outcome_of, print};
-use crate::diagnose::{Diagnosed, diagnose};
+use super::{load_study, outcome_of, print};
+use crate::diagnose::{Diagnosed, diagnose_study};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::{Progress, UntilInterrupted};
-use crate::recording::Recording;
 use crate::report;
-use crate::rig::{Rig, RigDocument};
+use crate::rig::RigDocument;
+use crate::study::Study;
 
-/// Files that a diagnosis writes into its folder: result, report, rig with the effects found.
-pub const FILES: [&str; 3] = ["diagnosis.json", "report.html", "rig.diagnosed.toml"];
+/// The result of a diagnosis, in its folder.
+pub const RESULT: &str = "diagnosis.json";
+
+/// Its report.
+pub const REPORT: &str = "report.html";
+
+/// The rig file with what was found, where there is one bench.
+pub const RIG: &str = "rig.diagnosed.toml";
 
 /// Arguments of `bowden diagnose`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct DiagnoseArguments {
-    /// Recordings of the bench (.csv, .csv.gz, .mcap)
+    /// Recordings of the bench (.csv, .csv.gz, .mcap), or one study of several benches or recordings (.toml)
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Rig file: what the bench is believed to be
+    /// Rig file: what the bench is believed to be; a study names its own
     #[arg(long, value_name = "RIG.toml")]
-    rig: PathBuf,
+    rig: Option<PathBuf>,
     /// Folder for diagnosis.json, report.html, rig.diagnosed.toml and references of experiments worth
     /// doing; made if it is not there
     #[arg(long, value_name = "DIR")]
@@ -48,14 +54,8 @@ fn on_request() -> impl Iterator<Item = &'static str> {
 /// What a diagnosis works on, checked.
 #[derive(Clone, Debug)]
 pub struct DiagnoseTask {
-    /// The bench.
-    pub rig: Rig,
-    /// Its file, to be changed and written.
-    pub document: RigDocument,
-    /// Recordings to learn from.
-    pub training: Vec<Recording>,
-    /// Recordings to judge by; empty if none were given.
-    pub heldout: Vec<Recording>,
+    /// Benches and recordings.
+    pub study: Study,
     /// Folder for the results.
     pub out: PathBuf,
 }
@@ -66,26 +66,15 @@ impl DiagnoseArguments {
     /// # Errors
     /// What makes an input unusable or the output impossible; a recording that is both training and held out.
     pub fn prepare(&self) -> Result<DiagnoseTask, Failure> {
-        for heldout in &self.heldout {
-            let same = |path: &&PathBuf| path.canonicalize().ok() == heldout.canonicalize().ok();
-            if heldout.exists() && self.recordings.iter().any(|path| same(&path)) {
-                return Err(Failure::bad_input(format!(
-                    "{}: given as training and as held out; a judge must be another recording",
-                    heldout.display()
-                )));
-            }
-        }
-        let document = RigDocument::load(&self.rig)?;
-        let rig = document.rig()?;
-        let mut inputs = all_paths(&[&self.recordings, &self.heldout]);
-        inputs.push(&self.rig);
         output::check_folder(&self.out)?;
-        let training = load_recordings(&rig, &self.recordings)?;
-        let heldout = load_recordings(&rig, &self.heldout)?;
+        let study = load_study(&self.recordings, self.rig.as_deref(), &self.heldout)?;
         let earlier = earlier_experiments(&self.out);
-        let files: Vec<&str> = FILES.into_iter().chain(earlier.iter().map(String::as_str)).collect();
+        let rigs = rig_files(&study);
+        let files: Vec<&str> =
+            [RESULT, REPORT].into_iter().chain(rigs.iter().chain(&earlier).map(String::as_str)).collect();
+        let inputs: Vec<&Path> = study.files.iter().map(PathBuf::as_path).collect();
         output::prepare_folder(&self.out, &files, &inputs)?;
-        Ok(DiagnoseTask { rig, document, training, heldout, out: self.out.clone() })
+        Ok(DiagnoseTask { study, out: self.out.clone() })
     }
 
     /// Diagnoses the recordings and writes result, report and rig.
@@ -94,13 +83,19 @@ impl DiagnoseArguments {
     /// What makes an input unusable, or the reason why no result can be written.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
         interrupt::catch()?;
-        let mut task = self.prepare()?;
+        let DiagnoseTask { mut study, out } = self.prepare()?;
         let progress = &UntilInterrupted(progress);
         let also: Vec<&str> = self.also.iter().map(String::as_str).collect();
-        let diagnosed = diagnose(&task.rig, &task.training, &task.heldout, &also, progress)?;
-        let page = save(&diagnosed, &mut task.document, &task.out)?;
+        let diagnosed = diagnose_study(&study, &also, progress)?;
+        let names = rig_files(&study);
+        let mut rigs: Vec<(&str, &mut RigDocument)> = names
+            .iter()
+            .zip(&mut study.benches)
+            .map(|(name, bench)| (name.as_str(), &mut bench.document))
+            .collect();
+        let page = save(&diagnosed, &mut rigs, &out)?;
         print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
-        let mut outcome = outcome_of(task.training.iter().chain(&task.heldout));
+        let mut outcome = outcome_of(study.recordings.iter().map(|listed| &listed.recording));
         if !diagnosed.findings.diagnosis.complete {
             outcome.extend([
                 "stopped early: not every effect was tried; run it again to the end before trusting it",
@@ -110,19 +105,26 @@ impl DiagnoseArguments {
     }
 }
 
-/// Writes result, report, rig and references of a diagnosis into its folder, in place of an earlier one's; returns where the
-/// report is. `document` is the rig file that was diagnosed and gets the physics that was found.
+/// Writes result, report, rigs and references of a diagnosis into its folder, in place of an earlier one's; returns where the
+/// report is. `rigs` are the rig files that were diagnosed, one a bench, under the names to write; they get the physics
+/// that was found.
 ///
 /// # Errors
-/// When the medium refuses, or the rig file cannot take a value.
-pub fn save(diagnosed: &Diagnosed, document: &mut RigDocument, folder: &Path) -> Result<PathBuf, Failure> {
-    let [result, page, rig] = FILES.map(|name| folder.join(name));
+/// When the medium refuses, or a rig file cannot take a value.
+pub fn save(
+    diagnosed: &Diagnosed,
+    rigs: &mut [(&str, &mut RigDocument)],
+    folder: &Path,
+) -> Result<PathBuf, Failure> {
+    let [result, page] = [RESULT, REPORT].map(|name| folder.join(name));
     let json = serde_json::to_string_pretty(&diagnosed.findings.diagnosis)
         .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
     output::write_file(&result, |file| writeln!(file, "{json}"))?;
     output::write_file(&page, |file| file.write_all(report::render(&diagnosed.findings).as_bytes()))?;
-    diagnosed.write_into(document)?;
-    document.save(&rig)?;
+    for (bench, (name, document)) in rigs.iter_mut().enumerate() {
+        diagnosed.write_into(bench, document)?;
+        document.save(&folder.join(name))?;
+    }
     for earlier in earlier_experiments(folder) {
         output::remove_file(&folder.join(earlier))?;
     }
@@ -130,6 +132,14 @@ pub fn save(diagnosed: &Diagnosed, document: &mut RigDocument, folder: &Path) ->
         experiment.reference.save(&folder.join(&experiment.file))?;
     }
     Ok(page)
+}
+
+/// Names of the rig files that a diagnosis writes, one a bench.
+fn rig_files(study: &Study) -> Vec<String> {
+    match &study.benches[..] {
+        [_] => vec![RIG.to_owned()],
+        benches => benches.iter().map(|bench| format!("rig.diagnosed.{}.toml", bench.name)).collect(),
+    }
 }
 
 /// Names of the references that an earlier diagnosis left in `folder`: they ask for what may be settled by now.

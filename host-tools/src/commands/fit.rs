@@ -1,27 +1,27 @@
 //! `bowden fit`: recalibrates the nominal parameters of a rig.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{all_paths, load_recordings, outcome_of, print};
+use super::{all_paths, load_study, outcome_of, print};
 use crate::fit::objective::Series;
-use crate::fit::recalibrate::{FittedParameter, Recalibration, recalibrate};
+use crate::fit::recalibrate::{FittedParameter, Recalibration, recalibrate_study};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::Progress;
-use crate::recording::Recording;
-use crate::rig::{Rig, RigDocument};
+use crate::study::Study;
 
 /// Arguments of `bowden fit`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FitArguments {
-    /// Recordings of the bench (.csv, .csv.gz, .mcap)
+    /// Recordings of the bench (.csv, .csv.gz, .mcap), or one study of several benches or recordings (.toml)
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Rig file with the values to start from
+    /// Rig file with the values to start from; a study names its own
     #[arg(long, value_name = "RIG.toml")]
-    rig: PathBuf,
-    /// Rig file to write: the same with the fitted values
+    rig: Option<PathBuf>,
+    /// Rig file to write: the same with the fitted values. Of a study the folder for rig.fitted.toml, or for
+    /// rig.fitted.BENCH.toml of each bench
     #[arg(long, value_name = "FITTED.toml")]
     out: PathBuf,
 }
@@ -29,28 +29,26 @@ pub struct FitArguments {
 /// What a fit works on, checked.
 #[derive(Clone, Debug)]
 pub struct FitTask {
-    /// The bench.
-    pub rig: Rig,
-    /// Its file, to be changed and written.
-    pub document: RigDocument,
-    /// What was recorded.
-    pub recordings: Vec<Recording>,
-    /// Where the fitted rig goes.
-    pub out: PathBuf,
+    /// Benches and recordings.
+    pub study: Study,
+    /// Where the fitted rigs go, one file a bench.
+    pub out: Vec<PathBuf>,
 }
 
 impl FitArguments {
-    /// Fits, writes the fitted rig and prints what changed and what stays unknown.
+    /// Fits, writes the fitted rigs and prints what changed and what stays unknown.
     ///
     /// # Errors
-    /// See [`FitArguments::prepare`] and [`recalibrate`].
+    /// See [`FitArguments::prepare`] and [`recalibrate_study`].
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
         let mut task = self.prepare()?;
-        let result = recalibrate(&task.rig, &task.recordings, progress)?;
-        result.write_to(&mut task.document)?;
-        task.document.save(&task.out)?;
-        print(&table(&result))?;
-        Ok(outcome_of(&task.recordings))
+        let result = recalibrate_study(&task.study, progress)?;
+        for (index, (bench, out)) in task.study.benches.iter_mut().zip(&task.out).enumerate() {
+            result.write_to(index, &mut bench.document)?;
+            bench.document.save(out)?;
+        }
+        print(&table(&result, &task.study))?;
+        Ok(outcome_of(task.study.recordings.iter().map(|listed| &listed.recording)))
     }
 
     /// Checks the output and reads the inputs.
@@ -59,21 +57,34 @@ impl FitArguments {
     /// What makes an input unusable or the output impossible.
     pub fn prepare(&self) -> Result<FitTask, Failure> {
         let mut inputs = all_paths(&[&self.recordings]);
-        inputs.push(&self.rig);
-        output::check_file(&self.out, &inputs)?;
-        let document = RigDocument::load(&self.rig)?;
-        let rig = document.rig()?;
-        let recordings = load_recordings(&rig, &self.recordings)?;
-        Ok(FitTask { rig, document, recordings, out: self.out.clone() })
+        inputs.extend(self.rig.as_deref());
+        let of_a_study = self.rig.is_none();
+        if !of_a_study {
+            output::check_file(&self.out, &inputs)?;
+        }
+        let study = load_study(&self.recordings, self.rig.as_deref(), &[])?;
+        let out = if of_a_study { into_folder(&study, &self.out)? } else { vec![self.out.clone()] };
+        Ok(FitTask { study, out })
     }
 }
 
+/// Files in a folder for the fitted rigs of a study; the folder is made if it is not there.
+fn into_folder(study: &Study, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let names: Vec<String> = match &study.benches[..] {
+        [_] => vec!["rig.fitted.toml".to_owned()],
+        benches => benches.iter().map(|bench| format!("rig.fitted.{}.toml", bench.name)).collect(),
+    };
+    let inputs: Vec<&Path> = study.files.iter().map(PathBuf::as_path).collect();
+    output::prepare_folder(folder, &names.iter().map(String::as_str).collect::<Vec<_>>(), &inputs)?;
+    Ok(names.iter().map(|name| folder.join(name)).collect())
+}
+
 /// The result as text: parameters, channels, and what the recordings leave open.
-fn table(result: &Recalibration) -> String {
+fn table(result: &Recalibration, study: &Study) -> String {
     let mut text =
         format!("{:<32}{:>12}  {:>12}   {:<14}{}\n", "parameter", "nominal", "fitted", "± std", "unit");
     for parameter in &result.parameters {
-        let _ = writeln!(text, "{}", row(parameter));
+        let _ = writeln!(text, "{}", row(parameter, study));
     }
     let _ = writeln!(text, "\n{:<32}{:>12}  {:>12}   {:<14}unit", "RMS difference", "nominal", "fitted", "");
     for channel in &result.channels {
@@ -96,8 +107,11 @@ fn table(result: &Recalibration) -> String {
     text
 }
 
-fn row(parameter: &FittedParameter) -> String {
-    let path = format!("{}.{}", parameter.section, parameter.name);
+fn row(parameter: &FittedParameter, study: &Study) -> String {
+    let path = match parameter.bench {
+        Some(bench) => format!("{} ({})", parameter.parameter, study.benches[bench].name),
+        None => parameter.parameter.to_string(),
+    };
     let spread = match (parameter.at_bound, parameter.std) {
         (true, _) => "at bound".to_owned(),
         (false, Some(std)) => format!("± {std:.2e}"),

@@ -6,7 +6,7 @@ use super::outcome_of;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::recording::{Format, Recording};
-use crate::rig::Rig;
+use crate::rig::{Assignment, Rig};
 
 /// Arguments of `bowden replay`.
 #[derive(Clone, Debug, clap::Args)]
@@ -19,6 +19,9 @@ pub struct ReplayArguments {
     /// Prediction to write: `t_s` and every output, one row a recorded sample (.csv, .csv.gz, .mcap)
     #[arg(long, value_name = "PRED.csv")]
     out: PathBuf,
+    /// What is different in this recording. May be repeated
+    #[arg(long, value_name = "PARAMETER=VALUE")]
+    set: Vec<Assignment>,
 }
 
 /// What a replay works on, checked.
@@ -50,7 +53,10 @@ impl ReplayArguments {
     pub fn prepare(&self) -> Result<ReplayTask, Failure> {
         Format::for_output(&self.out)?;
         output::check_file(&self.out, &[&self.recording, &self.rig])?;
-        let rig = Rig::load(&self.rig)?;
+        let mut rig = Rig::load(&self.rig)?;
+        for assignment in &self.set {
+            assignment.apply(&mut rig)?;
+        }
         let recording = rig.load_inputs(&self.recording)?;
         Ok(ReplayTask { rig, recording, out: self.out.clone() })
     }

@@ -39,7 +39,7 @@ pub struct Experiment {
     pub words: String,
     /// Its reference: `theta_ref_rad` over time.
     pub reference: Recording,
-    /// Difference of the mean losses of the two explanations; 1 is the usual difference between two realities.
+    /// Difference of the mean losses of the two explanations; 1 is what sensor noise and an ordinary bench leave.
     pub separation: f64,
 }
 
@@ -165,7 +165,7 @@ impl Experiment {
     pub fn in_words(&self) -> String {
         let Self { words, file, separation, .. } = self;
         format!(
-            "{words} ({file}); the two part there by {separation:.1} times the usual difference between two realities"
+            "{words} ({file}); there the two differ by {separation:.1} times what sensor noise and an ordinary bench leave"
         )
     }
 }

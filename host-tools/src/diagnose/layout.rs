@@ -10,7 +10,7 @@ use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 
-use crate::fit::free::{Free, recalibrated, recalibrated_from};
+use crate::fit::free::{Free, own_of_effect, recalibrated, recalibrated_from};
 use crate::joint_model::JointModel;
 
 /// An effect that every bench has a little of, told by its first parameter.
@@ -149,7 +149,7 @@ impl Layout {
 
     /// Places, among the parameters of [`Self::free`], of the ordinary effects that `other` lacks.
     pub(super) fn parameters_missing_in(&self, other: &Self, model: &JointModel) -> Vec<usize> {
-        let nominal = recalibrated(model).len();
+        let nominal = self.calibrated(model).len();
         let gone = |(_, place): &(usize, &usize)| !other.ordinary.contains(place);
         self.ordinary.iter().enumerate().filter(gone).map(|(index, _)| nominal + index).collect()
     }
@@ -158,6 +158,7 @@ impl Layout {
     /// their limits, and those of all found effects.
     pub(super) fn free(&self, believed: &JointModel, model: &JointModel) -> Vec<Free> {
         let mut free = recalibrated_from(believed, model);
+        free.extend(self.stated(model));
         for (index, place) in self.ordinary.iter().enumerate() {
             if let (Some([size, largest]), Some(parameter)) =
                 ((ORDINARY[*place].sizes)(believed), Free::effect(model, self.own + index, 0))
@@ -166,8 +167,27 @@ impl Layout {
             }
         }
         for effect in self.first_found()..model.effects.len() {
-            free.extend(Free::of_effect(model, effect));
+            free.extend(Self::of_found(model, effect));
         }
+        free
+    }
+
+    /// Parameters that are fitted without any effect beyond those of the rig: the first of [`Self::free`].
+    pub(super) fn calibrated(&self, model: &JointModel) -> Vec<Free> {
+        let mut free = recalibrated(model);
+        free.extend(self.stated(model));
+        free
+    }
+
+    /// Parameters of the rig's own effects that single benches have for themselves.
+    fn stated(&self, model: &JointModel) -> Vec<Free> {
+        (0..self.own).flat_map(|effect| own_of_effect(model, effect)).collect()
+    }
+
+    /// Parameters of a found effect, shared ones first.
+    pub(super) fn of_found(model: &JointModel, effect: usize) -> Vec<Free> {
+        let mut free = Free::of_effect(model, effect);
+        free.extend(own_of_effect(model, effect));
         free
     }
 }

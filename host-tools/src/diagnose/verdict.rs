@@ -73,6 +73,9 @@ pub struct NamedEffect {
 pub struct Recalibrated {
     /// `section.name`.
     pub parameter: String,
+    /// Bench of a study that has the parameter for itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Value in the rig file.
     pub nominal: f64,
     /// Value that fits.
@@ -93,6 +96,15 @@ pub(super) const WRONG_ON_PAPER: f64 = 0.1;
 pub(super) const WRONG_WHEN_MOUNTED: f64 = 0.15;
 
 impl Recalibrated {
+    /// Name of the parameter, with the bench that has it for itself.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match &self.bench {
+            Some(bench) => format!("{} ({bench})", self.parameter),
+            None => self.parameter.clone(),
+        }
+    }
+
     /// Relative change against the rig file.
     #[must_use]
     pub fn change(&self) -> f64 {
@@ -371,6 +383,7 @@ mod tests {
         ] {
             let found = Recalibrated {
                 parameter: parameter.to_owned(),
+                bench: None,
                 nominal: 1.0,
                 fitted,
                 std: None,

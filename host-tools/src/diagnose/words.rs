@@ -139,7 +139,7 @@ pub(super) fn summary(
     let changed: Vec<String> = recalibrated
         .iter()
         .filter(|p| p.is_wrong())
-        .map(|p| format!("{} {:+.0} %", p.parameter, 100.0 * p.change()))
+        .map(|p| format!("{} {:+.0} %", p.name(), 100.0 * p.change()))
         .collect();
     let parameters = if changed.is_empty() {
         format!(
@@ -161,7 +161,7 @@ pub(super) fn summary(
             let names: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
             format!(
                 "The simulation lacks {}: adding it brings the held-out loss from {loss_recalibrated:.2} to \
-                 {loss_after:.2} (1 is the usual difference between two realities). {parameters}",
+                 {loss_after:.2} (normalised error; 1 is what sensor noise and an ordinary bench leave). {parameters}",
                 names.join(" and ")
             )
         }

@@ -5,6 +5,7 @@ use bowden_model::parameters::{NOMINAL_PARAMETERS, NominalParameter};
 
 use super::typical::typical;
 use crate::joint_model::JointModel;
+use crate::rig::RigParameter;
 
 /// Where a free parameter stands in a model.
 #[derive(Clone, Copy)]
@@ -18,6 +19,18 @@ pub enum Place {
         /// Index into its parameters.
         parameter: usize,
     },
+    /// Value of a parameter on one bench: an index into the values of [`JointModel::own`].
+    Own(usize),
+}
+
+impl Place {
+    /// Whether it is one of `parameters`.
+    fn is_any_of(&self, parameters: &[RigParameter]) -> bool {
+        match self {
+            Self::Nominal(parameter) => parameters.contains(&RigParameter::Nominal(parameter)),
+            Self::Effect { .. } | Self::Own(_) => false,
+        }
+    }
 }
 
 /// A parameter that is fitted.
@@ -49,6 +62,26 @@ impl Free {
         spec.scale = if ratio { Scale::Log } else { Scale::Linear };
         let size = if ratio { 1.0 } else { spec.default.max(start) };
         Some(Self { place: Place::Nominal(parameter), spec, start, size, prior: (0.0, NOMINAL_PRIOR_STD) })
+    }
+
+    /// A parameter with a value of its own on one bench of `model`; `None` for one of an effect that the model lacks.
+    #[must_use]
+    pub fn own(model: &JointModel, index: usize) -> Option<Self> {
+        let own = model.own.values.get(index)?;
+        let free = match own.parameter {
+            RigParameter::Nominal(parameter) => Self::nominal(model, parameter.section, parameter.spec.name)?,
+            RigParameter::Effect { descriptor, index } => {
+                let effect =
+                    model.effects.iter().position(|active| active.descriptor().id == descriptor.id)?;
+                Self::effect(model, effect, index)?
+            }
+            RigParameter::Controller(_) => return None,
+        };
+        let mut free = Self { place: Place::Own(index), ..free };
+        if let Some(value) = own.value {
+            free.start = value;
+        }
+        Some(free)
     }
 
     /// Parameter of an effect of `model`.
@@ -130,6 +163,28 @@ impl Free {
         self.start
     }
 
+    /// The parameter by its name in rig files; `None` where the model lacks the effect.
+    #[must_use]
+    pub fn parameter(&self, model: &JointModel) -> Option<RigParameter> {
+        match self.place {
+            Place::Nominal(parameter) => Some(RigParameter::Nominal(parameter)),
+            Place::Effect { effect, parameter } => model
+                .effects
+                .get(effect)
+                .map(|active| RigParameter::Effect { descriptor: active.descriptor(), index: parameter }),
+            Place::Own(index) => model.own.values.get(index).map(|own| own.parameter),
+        }
+    }
+
+    /// Bench that has the parameter for itself; `None` for a shared one.
+    #[must_use]
+    pub fn bench(&self, model: &JointModel) -> Option<usize> {
+        match self.place {
+            Place::Own(index) => model.own.values.get(index).map(|own| own.bench),
+            Place::Nominal(_) | Place::Effect { .. } => None,
+        }
+    }
+
     /// Name as reports write it, `section.name`.
     #[must_use]
     pub fn path(&self, model: &JointModel) -> String {
@@ -139,6 +194,13 @@ impl Free {
                 let id = model.effects.get(effect).map_or("effect", |active| active.descriptor().id);
                 format!("{id}.{}", self.spec.name)
             }
+            Place::Own(index) => match model.own.values.get(index).map(|own| own.parameter) {
+                Some(RigParameter::Effect { descriptor, index }) => {
+                    format!("{}.{}", descriptor.id, descriptor.parameters[index].name)
+                }
+                Some(parameter) => parameter.to_string(),
+                None => self.spec.name.to_owned(),
+            },
         }
     }
 
@@ -196,6 +258,11 @@ impl Free {
                     active.parameters[parameter] = value;
                 }
             }
+            Place::Own(index) => {
+                if let Some(own) = model.own.values.get_mut(index) {
+                    own.value = Some(value);
+                }
+            }
         }
     }
 }
@@ -217,13 +284,25 @@ pub const RECALIBRATED: [(&str, &str); 6] = [
 /// an effect that it can name.
 pub const VISCOUS: [(&str, &str); 2] = [("motor", "viscous_nm_s_per_rad"), ("load", "viscous_nm_s_per_rad")];
 
-/// The parameters of [`RECALIBRATED`] that `model` has.
+/// The parameters of [`RECALIBRATED`] that `model` has and shares, and the nominal parameters that single benches have for
+/// themselves.
 #[must_use]
 pub fn recalibrated(model: &JointModel) -> Vec<Free> {
-    RECALIBRATED.iter().filter_map(|(section, name)| Free::nominal(model, section, name)).collect()
+    let of_benches = (0..model.own.values.len())
+        .filter(|index| !model.own.values[*index].parameter.is_of_effect())
+        .filter_map(|index| Free::own(model, index));
+    shared(model, &RECALIBRATED).chain(of_benches).collect()
 }
 
-/// The same, with what `believed` states as the prior, wherever `model` has got to.
+/// The parameters of `names` that `model` has and that not every bench has for itself.
+fn shared<'m>(model: &'m JointModel, names: &'m [(&str, &str)]) -> impl Iterator<Item = Free> + 'm {
+    names
+        .iter()
+        .filter_map(|(section, name)| Free::nominal(model, section, name))
+        .filter(|free| !free.place().is_any_of(&model.own.everywhere))
+}
+
+/// The same as [`recalibrated`], with what `believed` states as the prior, wherever `model` has got to.
 #[must_use]
 pub fn recalibrated_from(believed: &JointModel, model: &JointModel) -> Vec<Free> {
     recalibrated(model)
@@ -231,6 +310,17 @@ pub fn recalibrated_from(believed: &JointModel, model: &JointModel) -> Vec<Free>
         .zip(recalibrated(believed))
         .map(|(free, before)| free.believed_within(before.start, NOMINAL_PRIOR_STD))
         .collect()
+}
+
+/// Parameters of effect `effect` of `model` that single benches have for themselves.
+#[must_use]
+pub fn own_of_effect(model: &JointModel, effect: usize) -> Vec<Free> {
+    let Some(id) = model.effects.get(effect).map(|active| active.descriptor().id) else { return Vec::new() };
+    let belongs = |index: &usize| match model.own.values[*index].parameter {
+        RigParameter::Effect { descriptor, .. } => descriptor.id == id,
+        _ => false,
+    };
+    (0..model.own.values.len()).filter(belongs).filter_map(|index| Free::own(model, index)).collect()
 }
 
 /// The parameters of [`RECALIBRATED`] and [`VISCOUS`] that `model` has.

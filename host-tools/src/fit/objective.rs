@@ -22,6 +22,7 @@ use bowden_model::channel::Channel;
 use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 
+use crate::fit::variation::Variation;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::reconstruct::quantum_of;
@@ -106,7 +107,19 @@ pub struct Objective {
     datasets: Vec<Arc<Dataset>>,
     scales: Vec<(Series, f64)>,
     noise_variances: Vec<(Series, f64)>,
-    free_offsets: Vec<Channel>,
+}
+
+/// A recording and what it is used for.
+#[derive(Clone, Debug)]
+pub struct Observed<'r> {
+    /// The samples.
+    pub recording: &'r Recording,
+    /// Whether anything is fitted to it.
+    pub part: Part,
+    /// Index of the bench.
+    pub bench: usize,
+    /// What is different in it; `None` where its joint is the one that all share.
+    pub variation: Option<Variation>,
 }
 
 /// Residuals of every series and block, in scales.
@@ -137,16 +150,33 @@ impl Objective {
         heldout: &[Recording],
         split: bool,
     ) -> Result<Self, Failure> {
-        let mut datasets: Vec<Dataset> = Vec::new();
-        let mut clock_s = 0.0;
-        for (recording, part) in training
+        let observed: Vec<Observed> = training
             .iter()
-            .map(|recording| (recording, Part::Training))
-            .chain(heldout.iter().map(|recording| (recording, Part::HeldOut)))
-        {
-            let mut dataset = Dataset::new(model, recording, part, split && part == Part::Training)?;
-            dataset.input.continues_after(clock_s);
-            clock_s += recording.duration_s();
+            .map(|recording| Observed { recording, part: Part::Training, bench: 0, variation: None })
+            .chain(heldout.iter().map(|recording| Observed {
+                recording,
+                part: Part::HeldOut,
+                bench: 0,
+                variation: None,
+            }))
+            .collect();
+        Self::of(model, observed, split)
+    }
+
+    /// Prepares recordings of which each may differ from the joint that all share; those that are held out come last. The
+    /// recordings of a bench are taken to follow one another.
+    ///
+    /// # Errors
+    /// When an input is missing, or nothing can be compared.
+    pub fn of(model: &JointModel, observed: Vec<Observed>, split: bool) -> Result<Self, Failure> {
+        let mut datasets: Vec<Dataset> = Vec::new();
+        let mut clocks_s: Vec<f64> = Vec::new();
+        for Observed { recording, part, bench, variation } in observed {
+            let split = split && part == Part::Training;
+            let mut dataset = Dataset::new(model, recording, variation, part, split)?;
+            clocks_s.resize(clocks_s.len().max(bench + 1), 0.0);
+            dataset.input.continues_after(clocks_s[bench]);
+            clocks_s[bench] += recording.duration_s();
             datasets.push(dataset);
         }
         let mut series: Vec<Series> =
@@ -167,7 +197,7 @@ impl Objective {
             .map(|(series, noise)| (*series, scale_of(model, *series, *noise, &datasets)))
             .collect();
         let datasets = datasets.into_iter().map(Arc::new).collect();
-        Ok(Self { datasets, scales, noise_variances, free_offsets: model.free_offsets.clone() })
+        Ok(Self { datasets, scales, noise_variances })
     }
 
     /// The recordings of which anything is fitted to, and those that only judge. The residuals of all are those of the
@@ -269,7 +299,7 @@ impl Objective {
         let mut values = Vec::new();
         for dataset in &self.datasets {
             let mut seen = Blockwise::new(dataset);
-            replay_into(model, &dataset.input, &dataset.outputs, &mut seen)?;
+            replay_into(&dataset.joint(model), &dataset.input, &dataset.outputs, &mut seen)?;
             self.append(dataset, &seen.simulated, &mut values);
         }
         Ok(Residuals { values })
@@ -317,7 +347,7 @@ impl Objective {
         for (((series, _), real), simulated) in dataset.measured.iter().zip(&dataset.moments).zip(simulated) {
             let scale = self.scale(*series);
             let noise_variance = self.noise_variance(*series);
-            let offset = self.offset(*series, dataset, real, simulated);
+            let offset = Self::offset(*series, dataset, real, simulated);
             let pairs = || real.iter().zip(simulated);
             values.extend(pairs().map(|(real, simulated)| (real.mean - simulated.mean - offset) / scale));
             for group in &dataset.flutter {
@@ -334,9 +364,9 @@ impl Objective {
     }
 
     /// Zero of a channel in one recording, where the rig says that it is arbitrary; else 0.
-    fn offset(&self, series: Series, dataset: &Dataset, real: &[Moments], simulated: &[Moments]) -> f64 {
+    fn offset(series: Series, dataset: &Dataset, real: &[Moments], simulated: &[Moments]) -> f64 {
         match series {
-            Series::Channel(channel) if self.free_offsets.contains(&channel) => {
+            Series::Channel(channel) if dataset.free_offsets.contains(&channel) => {
                 let (mut sum, mut count) = (0.0, 0.0);
                 for ((block, real), simulated) in dataset.blocks.iter().zip(real).zip(simulated) {
                     let samples = (block.end - block.start) as f64;
@@ -383,7 +413,7 @@ impl Objective {
             let measured = &dataset.measured[place].1;
             let predicted = series.of(prediction).unwrap_or(&[]);
             let simulated = moments_of(predicted, &dataset.blocks);
-            let offset = self.offset(series, dataset, &dataset.moments[place], &simulated);
+            let offset = Self::offset(series, dataset, &dataset.moments[place], &simulated);
             for block in dataset.blocks.iter().filter(|block| block.part == part) {
                 for k in block.start..block.end {
                     sum += (measured[k] - predicted[k] - offset).powi(2);

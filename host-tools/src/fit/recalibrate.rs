@@ -1,14 +1,16 @@
 //! Recalibration of a rig: its nominal parameters fitted to all samples of recordings, and what stays unknown.
 
-use super::free::{Place, recalibrated};
+use super::free::{own_of_effect, recalibrated};
 use super::identifiability::{Group, Sensitivity};
 use super::objective::{Objective, Part, Series};
 use super::solver::solve;
+use super::variation::Variation;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 use crate::recording::Recording;
-use crate::rig::{Rig, RigDocument};
+use crate::rig::{Rig, RigDocument, RigParameter};
+use crate::study::Study;
 
 /// Evaluations that the optimiser may spend, times the number of parameters.
 const PATIENCE: usize = 10;
@@ -19,10 +21,10 @@ const DIGITS: i32 = 6;
 /// One parameter, before and after.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedParameter {
-    /// Section of the rig file.
-    pub section: &'static str,
-    /// Name in the section.
-    pub name: &'static str,
+    /// The parameter.
+    pub parameter: RigParameter,
+    /// Bench that has it for itself; `None` for one that all benches share.
+    pub bench: Option<usize>,
     /// Unit; `1` for a ratio.
     pub unit: &'static str,
     /// Value in the rig file.
@@ -57,15 +59,33 @@ pub struct Recalibration {
     pub groups: Vec<Group>,
     /// Parameters on which the recordings say nothing.
     pub unseen: Vec<String>,
+    /// Every bench as fitted.
+    joints: Vec<JointModel>,
 }
 
 impl Recalibration {
-    /// Writes the fitted values into a rig file.
+    /// Writes the fitted values of a bench into its rig file.
     ///
     /// # Errors
     /// Exit status 1, if the file cannot take one.
-    pub fn write_to(&self, document: &mut RigDocument) -> Result<(), Failure> {
-        self.parameters.iter().try_for_each(|p| document.set_nominal(p.section, p.name, p.fitted))
+    pub fn write_to(&self, bench: usize, document: &mut RigDocument) -> Result<(), Failure> {
+        let Some(joint) = self.joints.get(bench) else { return Ok(()) };
+        for fitted in self.parameters.iter().filter(|fitted| fitted.bench.is_none_or(|own| own == bench)) {
+            match (fitted.parameter, joint.value(&fitted.parameter)) {
+                (RigParameter::Nominal(parameter), Some(value)) => {
+                    let value = rounded(value).clamp(parameter.spec.lower, parameter.spec.upper);
+                    document.set_nominal(parameter.section, parameter.spec.name, value)?;
+                }
+                (RigParameter::Effect { descriptor, .. }, Some(_)) => {
+                    let stated = joint.effects.iter();
+                    stated
+                        .filter(|effect| effect.descriptor().id == descriptor.id)
+                        .try_for_each(|effect| document.add_effect(effect))?;
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 }
 
@@ -87,31 +107,54 @@ pub fn recalibrate(
     };
     let model = JointModel::from_rig(rig, first)?;
     let objective = Objective::new(&model, recordings, &[], false)?;
-    let free = recalibrated(&model);
+    let whole = Variation::new(model.clone(), 0, &model, Vec::new(), Vec::new());
+    recalibrated_joint(&objective, &model, &[whole], progress)
+}
+
+/// Fits the nominal parameters of the benches of a study to all samples of its recordings that are not held out; parameters that
+/// a bench has for itself are fitted to its recordings alone.
+///
+/// # Errors
+/// When a recording lacks an input, or a joint cannot be simulated.
+pub fn recalibrate_study(study: &Study, progress: &dyn Progress) -> Result<Recalibration, Failure> {
+    let model = study.joint()?;
+    let mut observed = study.observed(&model)?;
+    observed.retain(|observed| observed.part == Part::Training);
+    let objective = Objective::of(&model, observed, false)?;
+    let benches: Result<Vec<Variation>, Failure> =
+        (0..study.benches.len()).map(|bench| study.variation_of_bench(bench, &model)).collect();
+    recalibrated_joint(&objective, &model, &benches?, progress)
+}
+
+fn recalibrated_joint(
+    objective: &Objective,
+    model: &JointModel,
+    benches: &[Variation],
+    progress: &dyn Progress,
+) -> Result<Recalibration, Failure> {
+    let mut free = recalibrated(model);
+    free.extend((0..model.effects.len()).flat_map(|effect| own_of_effect(model, effect)));
     progress.stage("recalibrating", 0);
-    let before = objective.predict(&model)?;
-    let solution = solve(&objective, &model, &free, PATIENCE)?;
+    let before = objective.predict(model)?;
+    let solution = solve(objective, model, &free, PATIENCE)?;
     let after = objective.predict(&solution.model)?;
     progress.stage("what the recordings can tell apart", 0);
-    let sensitivity = Sensitivity::of(&objective, &solution.model)?;
+    let sensitivity = Sensitivity::of(objective, &solution.model)?;
 
     let parameters = free
         .iter()
         .zip(solution.values.iter().zip(&solution.stds))
-        .filter_map(|(free, (value, std))| match free.place() {
-            Place::Nominal(parameter) => {
-                let fitted = rounded(*value).clamp(free.spec().lower, free.spec().upper);
-                Some(FittedParameter {
-                    section: parameter.section,
-                    name: parameter.spec.name,
-                    unit: parameter.spec.unit,
-                    nominal: free.start(),
-                    fitted,
-                    std: *std,
-                    at_bound: free.at_bound(fitted),
-                })
-            }
-            Place::Effect { .. } => None,
+        .filter_map(|(free, (value, std))| {
+            let fitted = rounded(*value).clamp(free.spec().lower, free.spec().upper);
+            Some(FittedParameter {
+                parameter: free.parameter(model)?,
+                bench: free.bench(model),
+                unit: free.spec().unit,
+                nominal: free.start(),
+                fitted,
+                std: *std,
+                at_bound: free.at_bound(fitted),
+            })
         })
         .collect();
     let channels = objective
@@ -123,7 +166,13 @@ pub fn recalibrate(
             after: objective.rmse(&after, *series, Part::Training),
         })
         .collect();
-    Ok(Recalibration { parameters, channels, groups: sensitivity.groups(), unseen: sensitivity.unseen() })
+    Ok(Recalibration {
+        parameters,
+        channels,
+        groups: sensitivity.groups(),
+        unseen: sensitivity.unseen(),
+        joints: benches.iter().map(|bench| bench.apply(&solution.model)).collect(),
+    })
 }
 
 /// The value with [`DIGITS`] significant digits.

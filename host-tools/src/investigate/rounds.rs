@@ -6,7 +6,7 @@ use bowden_control::parameters::{Parameters, Reach};
 use serde::Serialize;
 
 use super::plan::{Demand, Limits, demand_of};
-use crate::commands::diagnose::save;
+use crate::commands::diagnose::{RIG, save};
 use crate::diagnose::verdict::{Diagnosis, Findings, Verdict};
 use crate::diagnose::{Experiment, diagnose};
 use crate::link::course::Track;
@@ -116,7 +116,7 @@ impl Case<'_> {
         let diagnosed = diagnose(&rig, &training, &heldout, &[], progress)?;
         let folder = self.folder.join(self.name);
         crate::output::prepare_folder(&folder, &[], &[])?;
-        save(&diagnosed, &mut document, &folder)?;
+        save(&diagnosed, &mut [(RIG, &mut document)], &folder)?;
         let diagnosis = &diagnosed.findings.diagnosis;
         if !diagnosis.complete {
             return Err(Failure::failed("stopped by the user during the diagnosis"));

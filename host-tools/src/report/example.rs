@@ -98,6 +98,7 @@ fn diagnosis() -> Diagnosis {
     };
     let recalibrated =
         |parameter: &str, nominal: f64, fitted: f64, std: Option<f64>, unit: &str| Recalibrated {
+            bench: None,
             parameter: parameter.into(),
             nominal,
             fitted,

@@ -90,7 +90,7 @@ fn recalibrated(diagnosis: &Diagnosis) -> Markup {
                 th scope="col" { "Remark" }
             } }
             tbody { @for row in &diagnosis.recalibrated { tr {
-                th scope="row" { code { (row.parameter) } }
+                th scope="row" { code { (row.name()) } }
                 td.number { (figures::quantity(row.nominal, &row.unit)) }
                 td.number { (figures::estimate(row.fitted, row.std, &row.unit)) }
                 td.number { (figures::change(row.nominal, row.fitted)) }

@@ -8,7 +8,7 @@ use bowden_model::parameters::{
 use toml::de::{DeTable, DeValue};
 
 use super::roles::can_drive;
-use super::section::{Bounds, Section, Source, advice};
+use super::section::{Bounds, FINITE, Section, Source, advice};
 use super::{Controller, Rig, SCHEMA, effects};
 use crate::outcome::Failure;
 use crate::recording::{ColumnMap, ColumnSource, TIME_ROLE};
@@ -42,14 +42,20 @@ const FULL_SCALE_N: Bounds = Bounds { lower: 0.1, upper: 1e6, unit: "N" };
 const TENSION_NOISE_N: Bounds = Bounds { lower: 0.0, upper: 1e4, unit: "N" };
 const CURRENT_NOISE_A: Bounds = Bounds { lower: 0.0, upper: 1e3, unit: "A" };
 
-const GAIN_DUTY_PER_RAD: Bounds = Bounds { lower: 1e-6, upper: 1e6, unit: "1/rad" };
-const DUTY_LIMIT: Bounds = Bounds { lower: 1e-3, upper: 1.0, unit: "1" };
-const DELAY_S: Bounds = Bounds { lower: 0.0, upper: 1.0, unit: "s" };
+const GAIN_DUTY_PER_RAD: Bounds<'static> = Bounds { lower: 1e-6, upper: 1e6, unit: "1/rad" };
+const DUTY_LIMIT: Bounds<'static> = Bounds { lower: 1e-3, upper: 1.0, unit: "1" };
+const DELAY_S: Bounds<'static> = Bounds { lower: 0.0, upper: 1.0, unit: "s" };
 
 const SMOOTHING_S: Bounds = Bounds { lower: 0.0, upper: 1.0, unit: "s" };
 
-/// Any finite number.
-const FINITE: Bounds = Bounds { lower: f64::MIN, upper: f64::MAX, unit: "1" };
+/// Accepted range of a number of `[controller]`.
+pub(super) fn controller_bounds(name: &str) -> Bounds<'static> {
+    match name {
+        "gain_duty_per_rad" => GAIN_DUTY_PER_RAD,
+        "duty_limit" => DUTY_LIMIT,
+        _ => DELAY_S,
+    }
+}
 
 pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
     let source = Source { name, text };
@@ -58,7 +64,7 @@ pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
         source.at(&span, format!("not TOML: {}; correct it", error.message()))
     })?;
     let file = Section::new(source, "", 0..0, document.get_ref());
-    check_schema(&file)?;
+    file.check_schema(SCHEMA)?;
     file.refuse_unknown("section", SECTIONS)?;
 
     let section = |key: &'static str| file.section(key, key);
@@ -106,18 +112,6 @@ pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
         relative_inputs: replay.relative_inputs,
         smoothing_s: replay.smoothing_s,
     })
-}
-
-fn check_schema(file: &Section) -> Result<(), Failure> {
-    match file.string("schema")? {
-        Some((schema, _)) if schema == SCHEMA => Ok(()),
-        Some((schema, span)) => Err(file
-            .source
-            .at(&span, format!("schema: got `{schema}`, expected `{SCHEMA}`; this version reads no other"))),
-        None => Err(file
-            .source
-            .at(&(0..0), format!("no `schema`, expected schema = \"{SCHEMA}\" as the first line; add it"))),
-    }
 }
 
 fn nominal_value(section: &Section, key: &str) -> Result<f64, Failure> {

@@ -21,12 +21,17 @@ pub(crate) struct Source<'t> {
 }
 
 impl Source<'_> {
-    /// A failure at a byte range, as `file:line:column: reason`; column counts characters from 1.
+    /// A failure at a byte range, as `file:line:column: reason`.
     pub(crate) fn at(&self, span: &Range<usize>, reason: impl std::fmt::Display) -> Failure {
+        Failure::bad_input(format!("{}: {reason}", self.place(span)))
+    }
+
+    /// Where a byte range begins, as `file:line:column`; column counts characters from 1.
+    pub(crate) fn place(&self, span: &Range<usize>) -> String {
         let before = self.text.get(..span.start).unwrap_or(self.text);
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
-        Failure::bad_input(format!("{}:{line}:{column}: {reason}", self.name))
+        format!("{}:{line}:{column}", self.name)
     }
 }
 
@@ -37,6 +42,9 @@ pub(crate) struct Bounds<'t> {
     pub(crate) upper: f64,
     pub(crate) unit: &'t str,
 }
+
+/// Any finite number.
+pub(crate) const FINITE: Bounds<'static> = Bounds { lower: f64::MIN, upper: f64::MAX, unit: "1" };
 
 /// One table of a rig file.
 #[derive(Clone)]
@@ -101,6 +109,45 @@ impl<'t> Section<'t> {
         match value.get_ref() {
             DeValue::Table(table) => Ok(Some(Section::new(self.source, name, value.span(), table))),
             _ => Err(self.wrong_type(key, value, "a table")),
+        }
+    }
+
+    /// The entries of a list of tables, `[[key]]`; none where it is not there.
+    pub(crate) fn sections(&self, key: &str, name: &'t str) -> Result<Vec<Section<'t>>, Failure> {
+        let Some(value) = self.get(key) else { return Ok(Vec::new()) };
+        let DeValue::Array(array) = value.get_ref() else {
+            return Err(self.wrong_type(key, value, &format!("tables [[{key}]]")));
+        };
+        array
+            .iter()
+            .map(|entry| match entry.get_ref() {
+                DeValue::Table(table) => Ok(Section::new(self.source, name, entry.span(), table)),
+                _ => Err(self.wrong_type(key, entry, &format!("tables [[{key}]]"))),
+            })
+            .collect()
+    }
+
+    /// Refuses a file whose `schema` is not `expected`.
+    pub(crate) fn check_schema(&self, expected: &str) -> Result<(), Failure> {
+        match self.string("schema")? {
+            Some((schema, _)) if schema == expected => Ok(()),
+            Some((schema, span)) => Err(self.source.at(
+                &span,
+                format!("schema: got `{schema}`, expected `{expected}`; this version reads no other"),
+            )),
+            None => Err(self.source.at(
+                &(0..0),
+                format!("no `schema`, expected schema = \"{expected}\" as the first line; add it"),
+            )),
+        }
+    }
+
+    /// `true` or `false`.
+    pub(crate) fn flag(&self, key: &str) -> Result<Option<bool>, Failure> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        match value.get_ref() {
+            DeValue::Boolean(flag) => Ok(Some(*flag)),
+            _ => Err(self.wrong_type(key, value, "true or false")),
         }
     }
 

@@ -1,5 +1,6 @@
 //! One recording, prepared for comparison: what goes into its replays, what they are compared with, and over which blocks.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use bowden_model::channel::Channel;
 
 use super::blockwise::{Moments, moments_of};
 use super::{Part, Series};
+use crate::fit::variation::Variation;
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
 use crate::recording::Recording;
@@ -41,6 +43,10 @@ pub struct Block {
 /// The recording.
 #[derive(Clone, Debug)]
 pub(super) struct Dataset {
+    /// What is different in it; `None` where its joint is the shared one.
+    variation: Option<Variation>,
+    /// Outputs whose zero is arbitrary.
+    pub(super) free_offsets: Vec<Channel>,
     pub(super) input: ReplayInput,
     /// What replays predict: the measured channels, and the current of the motor, which heats it.
     pub(super) outputs: Vec<Channel>,
@@ -55,9 +61,17 @@ pub(super) struct Dataset {
 }
 
 impl Dataset {
+    /// The joint of this recording, where all recordings share `model`.
+    pub(super) fn joint<'m>(&self, model: &'m JointModel) -> Cow<'m, JointModel> {
+        match &self.variation {
+            Some(variation) => Cow::Owned(variation.apply(model)),
+            None => Cow::Borrowed(model),
+        }
+    }
+
     /// What the sensors of this recording would have shown of `model`.
     pub(super) fn replay(&self, model: &JointModel) -> Result<Prediction, Failure> {
-        let mut prediction = replay_of(model, &self.input, &self.outputs)?;
+        let mut prediction = replay_of(&self.joint(model), &self.input, &self.outputs)?;
         for (channel, values) in prediction.channels_mut() {
             self.cut(channel, values);
         }
@@ -78,12 +92,15 @@ impl Dataset {
         moments_of(series.of(prediction).unwrap_or_default(), &self.blocks)
     }
 
+    /// Prepares a recording; `shared` is the joint that all recordings share.
     pub(super) fn new(
-        model: &JointModel,
+        shared: &JointModel,
         recording: &Recording,
+        variation: Option<Variation>,
         part: Part,
         split: bool,
     ) -> Result<Self, Failure> {
+        let model = variation.as_ref().map_or(shared, Variation::base);
         let mut input = ReplayInput::new(model, recording)?;
         if input.motion().is_none()
             && let Some(theta) = recording.channel(Channel::ThetaIn).or(recording.channel(Channel::ThetaOut))
@@ -129,7 +146,8 @@ impl Dataset {
             .into_iter()
             .filter(|channel| recording.channel(*channel).is_some_and(stood_at_zero))
             .collect();
-        Ok(Self { input, outputs, measured, moments, blocks, flutter, cut_at_zero })
+        let free_offsets = model.free_offsets.clone();
+        Ok(Self { variation, free_offsets, input, outputs, measured, moments, blocks, flutter, cut_at_zero })
     }
 }
 

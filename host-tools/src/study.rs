@@ -1,0 +1,142 @@
+//! A study: recordings of one or several benches that are diagnosed, fitted or checked together.
+
+mod file;
+mod joint;
+
+use std::path::{Path, PathBuf};
+
+use crate::outcome::Failure;
+use crate::recording::Recording;
+use crate::rig::{Assignment, Rig, RigDocument, RigParameter};
+use file::StudyFile;
+
+/// Value of `schema` in a study file.
+pub const SCHEMA: &str = "bowden-study/1";
+
+/// Recordings that are explained together.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Name in reports.
+    pub name: String,
+    /// At least one, each with a recording.
+    pub benches: Vec<Bench>,
+    /// Recordings to learn from, in the order of the file, followed by those that are held out.
+    pub recordings: Vec<StudyRecording>,
+    /// Every file that was read.
+    pub files: Vec<PathBuf>,
+}
+
+/// A bench of a study.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// Unique in the study; part of a file's name.
+    pub name: String,
+    /// What its user believes about it.
+    pub rig: Rig,
+    /// Its rig file.
+    pub document: RigDocument,
+    /// Parameters with a value of their own on this bench.
+    pub own: Vec<RigParameter>,
+}
+
+/// A recording of a study.
+#[derive(Clone, Debug)]
+pub struct StudyRecording {
+    /// The samples.
+    pub recording: Recording,
+    /// Index into the benches.
+    pub bench: usize,
+    /// Whether it judges the result and takes no other part.
+    pub heldout: bool,
+    /// What was different in this recording.
+    pub set: Vec<Assignment>,
+}
+
+impl Study {
+    /// Whether a path names a study file and not a recording.
+    #[must_use]
+    pub fn is_named_by(path: &Path) -> bool {
+        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    }
+
+    /// Reads a study file, its rig files and its recordings. Paths in the file are relative to its folder.
+    ///
+    /// # Errors
+    /// One line with file, line and column: no TOML, wrong schema, unknown key, bench or parameter (with the nearest name), a
+    /// bench without a recording to learn from, a recording that is listed twice, a value outside its range; also what
+    /// makes a rig file or a recording unusable.
+    pub fn load(path: &Path) -> Result<Self, Failure> {
+        let file = StudyFile::load(path)?;
+        let mut files = vec![path.to_owned()];
+        let mut benches = Vec::with_capacity(file.benches.len());
+        for bench in file.benches {
+            let document = RigDocument::load(&bench.rig)?;
+            let rig = document.rig()?;
+            if let Some((parameter, place)) =
+                bench.own.iter().find(|(p, _)| p.get(&rig).is_none() && !p.is_of_effect())
+            {
+                return Err(Failure::bad_input(format!(
+                    "{place}: `{parameter}` is not in {}; state it there or leave it out of `own`",
+                    bench.rig.display()
+                )));
+            }
+            files.push(bench.rig);
+            let own = bench.own.into_iter().map(|(parameter, _)| parameter).collect();
+            benches.push(Bench { name: bench.name, rig, document, own });
+        }
+        let mut recordings = Vec::with_capacity(file.recordings.len());
+        for listed in file.recordings {
+            let mut rig = benches[listed.bench].rig.clone();
+            for assignment in &listed.set {
+                let at_place = |reason| Failure::bad_input(format!("{}: {reason}", listed.set_at));
+                assignment.parameter.set(&mut rig, assignment.value).map_err(at_place)?;
+            }
+            recordings.push(StudyRecording {
+                recording: rig.load_recording(&listed.path)?,
+                bench: listed.bench,
+                heldout: listed.heldout,
+                set: listed.set,
+            });
+            files.push(listed.path);
+        }
+        recordings.sort_by_key(|recording| recording.heldout);
+        Ok(Self { name: file.name, benches, recordings, files })
+    }
+
+    /// The study of one bench, with nothing different between its recordings.
+    ///
+    /// # Errors
+    /// What makes the rig file or a recording unusable; a recording that is given twice.
+    pub fn of_one_bench(rig: &Path, training: &[PathBuf], heldout: &[PathBuf]) -> Result<Self, Failure> {
+        let document = RigDocument::load(rig)?;
+        let believed = document.rig()?;
+        let mut files = vec![rig.to_owned()];
+        let mut recordings = Vec::new();
+        for (path, heldout) in
+            training.iter().map(|path| (path, false)).chain(heldout.iter().map(|path| (path, true)))
+        {
+            if heldout && training.iter().any(|other| is_same(other, path)) {
+                return Err(Failure::bad_input(format!(
+                    "{}: given as training and as held out; a judge must be another recording",
+                    path.display()
+                )));
+            }
+            let recording = believed.load_recording(path)?;
+            recordings.push(StudyRecording { recording, bench: 0, heldout, set: Vec::new() });
+            files.push(path.clone());
+        }
+        let name = believed.name.clone();
+        let bench = Bench { name: name.clone(), rig: believed, document, own: Vec::new() };
+        Ok(Self { name, benches: vec![bench], recordings, files })
+    }
+
+    /// The recordings that are held out, or those that are not.
+    pub fn recordings_where(&self, heldout: bool) -> impl Iterator<Item = &Recording> {
+        self.recordings.iter().filter(move |r| r.heldout == heldout).map(|r| &r.recording)
+    }
+}
+
+/// Whether two paths lead to one file.
+fn is_same(one: &Path, other: &Path) -> bool {
+    one == other || one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
+}

@@ -1,0 +1,121 @@
+//! The joint that the recordings of a study share, and what is different in each of them.
+
+use super::{Bench, Study, StudyRecording};
+use crate::fit::free::RECALIBRATED;
+use crate::fit::objective::{Observed, Part};
+use crate::fit::variation::Variation;
+use crate::joint_model::{JointModel, OwnParameter, OwnParameters};
+use crate::outcome::Failure;
+use crate::rig::RigParameter;
+
+impl Study {
+    /// The joint that all recordings share: that of the first bench, with the parameters that benches have for themselves.
+    ///
+    /// A parameter that the rig files state differently is not shared, whether `own` names it or not. It is fitted on each
+    /// bench by itself if `own` names it there or a recalibration moves it, and otherwise stays as stated.
+    ///
+    /// # Errors
+    /// When a recording lacks what drives the joint.
+    pub fn joint(&self) -> Result<JointModel, Failure> {
+        let mut joint = self.joint_of(0)?;
+        let mut values = Vec::new();
+        for (index, bench) in self.benches.iter().enumerate() {
+            for parameter in self.fitted_on(bench) {
+                let value = parameter.get(&bench.rig);
+                values.push(OwnParameter { bench: index, parameter, value });
+            }
+        }
+        let on_every_bench = |parameter: &RigParameter| {
+            (0..self.benches.len())
+                .all(|bench| values.iter().any(|own| own.bench == bench && own.parameter == *parameter))
+        };
+        let everywhere = RigParameter::nominal().filter(on_every_bench).collect();
+        joint.own = OwnParameters { values, everywhere };
+        Ok(joint)
+    }
+
+    /// The recordings with their differences from `joint`, that of [`Study::joint`]; held-out ones last.
+    ///
+    /// # Errors
+    /// When a recording lacks what drives its joint.
+    pub fn observed(&self, joint: &JointModel) -> Result<Vec<Observed<'_>>, Failure> {
+        self.recordings
+            .iter()
+            .map(|listed| {
+                let variation =
+                    if self.is_plain(listed) { None } else { Some(self.variation(listed, joint)?) };
+                Ok(Observed {
+                    recording: &listed.recording,
+                    part: if listed.heldout { Part::HeldOut } else { Part::Training },
+                    bench: listed.bench,
+                    variation,
+                })
+            })
+            .collect()
+    }
+
+    /// What turns `joint` into that of a bench, with nothing that was different in one recording.
+    ///
+    /// # Errors
+    /// When its first recording lacks what drives it.
+    pub fn variation_of_bench(&self, bench: usize, joint: &JointModel) -> Result<Variation, Failure> {
+        Ok(Variation::new(
+            self.joint_of(bench)?,
+            bench,
+            joint,
+            self.kept_by(&self.benches[bench]),
+            Vec::new(),
+        ))
+    }
+
+    /// Whether the joint of a recording is the shared one.
+    fn is_plain(&self, listed: &StudyRecording) -> bool {
+        listed.bench == 0 && listed.set.is_empty() && self.fitted_on(&self.benches[0]).is_empty()
+    }
+
+    fn variation(&self, listed: &StudyRecording, joint: &JointModel) -> Result<Variation, Failure> {
+        let bench = &self.benches[listed.bench];
+        let mut rig = bench.rig.clone();
+        for assignment in &listed.set {
+            assignment.apply(&mut rig)?;
+        }
+        let base = JointModel::from_rig(&rig, &listed.recording)?;
+        let set = listed.set.iter().map(|assignment| assignment.parameter).collect();
+        Ok(Variation::new(base, listed.bench, joint, self.kept_by(bench), set))
+    }
+
+    /// The joint of a bench as its rig file states it, with the channels of its first recording.
+    fn joint_of(&self, bench: usize) -> Result<JointModel, Failure> {
+        let listed = self.recordings.iter().find(|listed| listed.bench == bench).ok_or_else(|| {
+            Failure::bad_input(format!("bench `{}` has no recording; add one", self.benches[bench].name))
+        })?;
+        JointModel::from_rig(&self.benches[bench].rig, &listed.recording)
+    }
+
+    /// Parameters that a fit moves on this bench by itself.
+    fn fitted_on(&self, bench: &Bench) -> Vec<RigParameter> {
+        let mut fitted = bench.own.clone();
+        for (section, name) in RECALIBRATED {
+            if let Ok(parameter) = RigParameter::parse(&format!("{section}.{name}"))
+                && self.is_stated_differently(&parameter)
+                && parameter.get(&bench.rig).is_some()
+                && !fitted.contains(&parameter)
+            {
+                fitted.push(parameter);
+            }
+        }
+        fitted
+    }
+
+    /// Nominal parameters of a bench that the shared joint does not decide.
+    fn kept_by(&self, bench: &Bench) -> Vec<RigParameter> {
+        RigParameter::nominal()
+            .filter(|parameter| bench.own.contains(parameter) || self.is_stated_differently(parameter))
+            .collect()
+    }
+
+    fn is_stated_differently(&self, parameter: &RigParameter) -> bool {
+        let mut stated = self.benches.iter().filter_map(|bench| parameter.get(&bench.rig));
+        stated.next().is_some_and(|first| stated.any(|other| other != first))
+    }
+}

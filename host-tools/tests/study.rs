@@ -1,0 +1,235 @@
+//! Studies: several benches and recordings fitted together, and what is refused.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use bowden::fit::recalibrate::recalibrate_study;
+use bowden::progress::Quiet;
+use bowden::recording::Recording;
+use bowden::rig::{Assignment, Rig};
+use bowden::simulate::{Motion, Reference, RunOptions, run};
+use bowden::study::Study;
+
+/// What a bench really is, beside what its rig file states.
+struct Truth {
+    file: &'static str,
+    parameters: &'static [&'static str],
+    seed: u64,
+}
+
+fn rig_text() -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rigs/bench.toml")).unwrap()
+}
+
+/// Records benches that differ from `rig.toml` into a folder.
+fn record(folder: &Path, truths: &[Truth]) {
+    fs::write(folder.join("rig.toml"), rig_text()).unwrap();
+    for Truth { file, parameters, seed } in truths {
+        let mut rig = Rig::load(&folder.join("rig.toml")).unwrap();
+        for parameter in *parameters {
+            parameter.parse::<Assignment>().unwrap().apply(&mut rig).unwrap();
+        }
+        let reference = Reference::of_motion(Motion::Lab, 10.0, *seed);
+        let options = RunOptions { seconds: 10.0, rate_hz: 500.0, seed: *seed };
+        let recording: Recording = run(&rig, &reference, options).unwrap();
+        recording.save(&folder.join(file)).unwrap();
+    }
+}
+
+fn bowden(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_bowden")).current_dir(folder).args(arguments).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
+}
+
+/// Two benches with pretensions of their own share the friction of their sheaths; a recording with another weight says so.
+#[test]
+fn benches_share_what_they_have_in_common_and_keep_what_is_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let truths = [
+        Truth {
+            file: "left.csv",
+            parameters: &["tendon.pretension_n=26", "sheath.friction_coefficient=0.15"],
+            seed: 5,
+        },
+        Truth {
+            file: "right.csv",
+            parameters: &["tendon.pretension_n=34", "sheath.friction_coefficient=0.15"],
+            seed: 6,
+        },
+        Truth {
+            file: "light.csv",
+            parameters: &["tendon.pretension_n=34", "sheath.friction_coefficient=0.15", "load.mass_kg=1.5"],
+            seed: 7,
+        },
+    ];
+    record(folder, &truths);
+    let study = r#"schema = "bowden-study/1"
+name = "two benches"
+[[bench]]
+name = "left"
+rig = "rig.toml"
+own = ["tendon.pretension_n"]
+[[bench]]
+name = "right"
+rig = "rig.toml"
+own = ["tendon.pretension_n"]
+[[recording]]
+file = "left.csv"
+bench = "left"
+[[recording]]
+file = "right.csv"
+bench = "right"
+[[recording]]
+file = "light.csv"
+bench = "right"
+set = { "load.mass_kg" = 1.5 }
+"#;
+    fs::write(folder.join("study.toml"), study).unwrap();
+    let loaded = Study::load(&folder.join("study.toml")).unwrap();
+    let result = recalibrate_study(&loaded, &Quiet).unwrap();
+    let fitted = |name: &str, bench: Option<usize>| {
+        let found = result.parameters.iter().find(|p| p.parameter.to_string() == name && p.bench == bench);
+        found.unwrap_or_else(|| panic!("{name} of bench {bench:?} was not fitted")).fitted
+    };
+    for (name, bench, truth) in [
+        ("tendon.pretension_n", Some(0), 26.0),
+        ("tendon.pretension_n", Some(1), 34.0),
+        ("sheath.friction_coefficient", None, 0.15),
+        // A weight of 2.5 kg all the same: the recording with another one says so.
+        ("load.mass_kg", None, 2.5),
+    ] {
+        let found = fitted(name, bench);
+        assert!((found / truth - 1.0).abs() < 0.03, "{name} of bench {bench:?}: {found} for {truth}");
+    }
+    let shared =
+        |p: &&bowden::fit::recalibrate::FittedParameter| p.parameter.to_string() == "tendon.pretension_n";
+    assert_eq!(result.parameters.iter().filter(shared).count(), 2, "every bench has its own, none is shared");
+
+    let (status, text, errors) = bowden(folder, &["fit", "study.toml", "--out", "fitted", "--quiet"]);
+    assert_eq!((status, errors.as_str()), (0, ""), "{text}");
+    for (bench, truth) in [("left", 26.0), ("right", 34.0)] {
+        let written = Rig::load(&folder.join(format!("fitted/rig.fitted.{bench}.toml"))).unwrap();
+        let pretension_n = written.joint.tendon.unwrap().pretension_n;
+        assert!((pretension_n / truth - 1.0).abs() < 0.03, "{bench}: {pretension_n}");
+        // What a recording states for itself does not reach the bench's file.
+        assert!((written.joint.load.unwrap().mass_kg / 2.5 - 1.0).abs() < 0.03);
+    }
+    // A replay of the light one with its weight is right, and without it is not.
+    let fitted_rig = ["--rig", "fitted/rig.fitted.right.toml"];
+    let error_n = |more: &[&str]| {
+        let arguments = [&["replay", "light.csv", "--out", "p.csv"][..], &fitted_rig, more].concat();
+        assert_eq!(bowden(folder, &arguments).0, 0);
+        let read = |file: &str| Recording::load(&folder.join(file), &Default::default()).unwrap();
+        let [measured, predicted] = ["light.csv", "p.csv"].map(read);
+        let f2 = |r: &Recording| r.channel(bowden_model::channel::Channel::F2).unwrap().to_vec();
+        let squares = f2(&measured).iter().zip(f2(&predicted)).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        (squares / measured.len() as f64).sqrt()
+    };
+    let (with, without) = (error_n(&["--set", "load.mass_kg=1.5"]), error_n(&[]));
+    assert!(with < 0.5 * without, "{with} N with the weight, {without} N without");
+}
+
+#[test]
+fn a_study_of_one_plain_bench_is_the_same_as_its_recordings_on_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, &[Truth { file: "a.csv", parameters: &["tendon.pretension_n=26"], seed: 5 }]);
+    let study = "schema = \"bowden-study/1\"\n[[bench]]\nname = \"only\"\nrig = \"rig.toml\"\n[[recording]]\nfile = \"a.csv\"\n";
+    fs::write(folder.join("study.toml"), study).unwrap();
+    assert_eq!(bowden(folder, &["fit", "study.toml", "--out", "fitted"]).0, 0);
+    assert_eq!(bowden(folder, &["fit", "a.csv", "--rig", "rig.toml", "--out", "plain.toml"]).0, 0);
+    let read = |file: &str| fs::read_to_string(folder.join(file)).unwrap();
+    assert_eq!(read("fitted/rig.fitted.toml"), read("plain.toml"));
+}
+
+#[test]
+fn check_tells_what_a_study_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(
+        folder,
+        &[
+            Truth { file: "a.csv", parameters: &[], seed: 5 },
+            Truth { file: "b.csv", parameters: &[], seed: 6 },
+        ],
+    );
+    let study = "schema = \"bowden-study/1\"\nname = \"pair\"\n[[bench]]\nname = \"only\"\nrig = \"rig.toml\"\nown = [\"load.arm_m\"]\n\
+         [[recording]]\nfile = \"a.csv\"\nset = { load.mass_kg = 2.0 }\n[[recording]]\nfile = \"b.csv\"\nheldout = true\n";
+    fs::write(folder.join("study.toml"), study).unwrap();
+    let (status, text, errors) = bowden(folder, &["check", "study.toml"]);
+    assert_eq!((status, errors.as_str()), (0, ""));
+    for part in ["study `pair`, benches: 1, recordings: 2", "own: load.arm_m", "load.mass_kg = 2", "held out"]
+    {
+        assert!(text.contains(part), "{part} not in {text}");
+    }
+}
+
+/// Each is one line with file, line and column, and exit status 2.
+#[test]
+fn unusable_studies_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, &[Truth { file: "a.csv", parameters: &[], seed: 5 }]);
+    let bench = "[[bench]]\nname = \"one\"\nrig = \"rig.toml\"\n";
+    let recording = "[[recording]]\nfile = \"a.csv\"\n";
+    for (body, line, reason) in [
+        (format!("{bench}[[recording]]\nfile = \"b.csv\"\n"), 6, "b.csv does not exist"),
+        (
+            format!("[[bench]]\nname = \"one\"\nrig = \"other.toml\"\n{recording}"),
+            4,
+            "other.toml does not exist",
+        ),
+        (bench.to_owned(), 2, "bench `one` has no recording to learn from"),
+        (format!("{bench}{recording}heldout = true\n"), 2, "bench `one` has no recording to learn from"),
+        (format!("{bench}own = [\"load.mas_kg\"]\n{recording}"), 5, "did you mean `load.mass_kg`?"),
+        (format!("{bench}own = [\"controller.delay_s\"]\n{recording}"), 5, "cannot be fitted"),
+        (format!("{bench}{recording}set = {{ \"load.mas_kg\" = 2 }}\n"), 7, "did you mean `load.mass_kg`?"),
+        (format!("{bench}{recording}set = {{ \"load.mass_kg\" = -2 }}\n"), 7, "allowed 0 to 1000 kg"),
+        (format!("{bench}{recording}set = {{ \"load.mass_kg\" = \"heavy\" }}\n"), 7, "expected a number"),
+        (format!("{bench}{recording}set = {{ \"controller.delay_s\" = 0.1 }}\n"), 7, "no [controller]"),
+        (format!("{bench}{recording}bench = \"two\"\n"), 7, "unknown bench `two`"),
+        (
+            format!("{bench}{recording}[[recording]]\nfile = \"./a.csv\"\nheldout = true\n"),
+            7,
+            "held out and not",
+        ),
+        (format!("{bench}{bench}{recording}"), 5, "described twice"),
+        (format!("{bench}{recording}held_out = true\n"), 7, "did you mean `heldout`?"),
+        (recording.to_owned(), 1, "no [[bench]]"),
+        (
+            format!("[[bench]]\nname = \"a/b\"\nrig = \"rig.toml\"\n{recording}"),
+            3,
+            "becomes part of a file's name",
+        ),
+    ] {
+        fs::write(folder.join("s.toml"), format!("schema = \"bowden-study/1\"\n{body}")).unwrap();
+        for command in [
+            &["check", "s.toml"][..],
+            &["fit", "s.toml", "--out", "o"],
+            &["diagnose", "s.toml", "--out", "o"],
+        ] {
+            let (status, _, errors) = bowden(folder, command);
+            assert_eq!(status, 2, "{body}: {errors}");
+            let expected = format!("bowden: s.toml:{line}:");
+            assert!(
+                errors.starts_with(&expected) && errors.contains(reason),
+                "{expected} {reason}: {errors}"
+            );
+            assert_eq!(errors.trim_end().lines().count(), 1, "{errors}");
+            assert!(!folder.join("o").exists(), "nothing is written");
+        }
+    }
+    for (arguments, reason) in [
+        (&["diagnose", "a.csv", "--out", "o"][..], "no rig; name it with --rig"),
+        (&["diagnose", "s.toml", "--rig", "rig.toml", "--out", "o"], "names its rigs and recordings itself"),
+        (&["fit", "s.toml", "a.csv", "--out", "o"], "names its rigs and recordings itself"),
+        (&["check", "none.toml"], "none.toml: cannot be read"),
+    ] {
+        let (status, _, errors) = bowden(folder, arguments);
+        assert!(status == 2 && errors.contains(reason) && errors.trim_end().lines().count() == 1, "{errors}");
+    }
+}
