@@ -97,7 +97,7 @@ pub fn write_tracking(table: &str, provenance: &str, page: &Path) -> Result<(), 
          *Removed* is the part of the error without compensation that is gone, seed by seed. Parameters are the same for \
          both loads;\nthose of a sensor set were chosen on seeds 101 to 110, the figures come from seeds {} on. The first two \
          sets run in position\nmode with `compensator.source` 3, the last in torque mode. A run that the supervisor stops counts \
-         as nothing removed.\n\n{table}",
+         as nothing removed. Position mode and steps of K follow below.\n\n{table}",
         crate::beyond::FIRST_SEED
     );
     fs::write(page, text).map_err(|error| format!("{}: {error}", page.display()))

@@ -52,6 +52,18 @@ pub struct StepFigures {
 }
 
 impl StepCase {
+    /// Whether K becomes larger.
+    #[must_use]
+    pub fn rises(&self) -> bool {
+        self.wrap_angle_rad[1] > self.wrap_angle_rad[0]
+    }
+
+    /// Whether the reference turns within 0.4 s before or after the step.
+    #[must_use]
+    pub fn is_near_turn(&self) -> bool {
+        (self.phase.rem_euclid(0.5) - 0.25).abs() < 0.4 * STEP_FREQUENCY_HZ
+    }
+
     /// Runs the step; `seed` is that of the sensor noise.
     ///
     /// # Errors
