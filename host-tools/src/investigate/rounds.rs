@@ -68,7 +68,7 @@ impl From<&Diagnosis> for Summary {
             verdict: diagnosis.verdict,
             summary: diagnosis.summary.clone(),
             effects: diagnosis.effects.clone(),
-            heldout_loss: diagnosis.heldout_loss.clone(),
+            heldout_loss: diagnosis.heldout_loss,
         }
     }
 }

@@ -75,13 +75,6 @@ impl Concealed {
         virtual_bench::LiveBench::new(&bench, &effects, drawn).map_err(|error| refuse(error.to_string()))?;
         Ok(Self { bench, effects, seed: drawn })
     }
-
-    /// The effects in words, `nothing` without one.
-    #[must_use]
-    pub fn in_words(&self) -> String {
-        let ids: Vec<&str> = self.effects.iter().map(ConcealedEffect::id).collect();
-        if ids.is_empty() { "nothing".to_owned() } else { ids.join(", ") }
-    }
 }
 
 #[cfg(test)]
