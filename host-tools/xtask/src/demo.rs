@@ -1,4 +1,4 @@
-//! `cargo xtask demo`: a bench with a fault that its rig file does not mention, recorded and diagnosed.
+//! `cargo xtask demo`: a joint with a fault that its rig file does not mention, found and made up for by `bowden investigate`.
 
 use std::fs;
 use std::path::Path;
@@ -9,9 +9,15 @@ use serde_json::Value;
 
 use crate::process::{self, built, cargo};
 
-/// What the bench conceals, with which strength, and the seed of the case.
-const CONCEALED: &str = "pretension_loss:1";
+/// What the joint conceals, and the seed of the case.
+const CONCEALED: &str = "transmission_backlash";
 const SEED: &str = "11";
+
+/// Time that the joint is driven, s of the simulated board.
+const JOINT_SECONDS: &str = "60";
+
+/// Weight on the arm of the simulated joint and its distance from the axis, kg and m.
+const LOAD: &str = "2.5,0.03";
 
 /// Runs the demonstration in `bowden-demo` below the current folder.
 ///
@@ -21,37 +27,46 @@ pub fn run() -> Result<(), String> {
     let started = Instant::now();
     let folder =
         std::env::current_dir().map_err(|error| format!("current folder: {error}"))?.join("bowden-demo");
-    println!("1/3 building bowden and virtual-bench");
-    let build = ["build", "--release", "--package", "bowden", "--package", "virtual-bench"];
-    process::run(&mut cargo(&build), &[0])?;
+    println!("1/3 building bowden");
+    process::run(&mut cargo(&["build", "--release", "--package", "bowden"]), &[0])?;
+    let out = folder.join("investigation");
+    clear(&out)?;
+    fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
 
-    println!("2/3 recording 60 s of a simulated bench that conceals something ({})", folder.display());
-    let mut record = Command::new(built("release", "virtual-bench")?);
-    record.args(["record", "--effect", CONCEALED, "--seed", SEED, "--out"]).arg(&folder);
-    process::run(&mut record, &[0])?;
+    println!("2/3 writing a rig file from the parameters of a simulated driver board ({})", folder.display());
+    let mut rig = Command::new(built("release", "bowden")?);
+    rig.current_dir(&folder).args(["record", "--port", "sim", "--seconds", "0.2", "--out", "rest.csv"]);
+    process::run(rig.args(["--rig", "rig.toml", "--load", LOAD]), &[0])?;
 
-    println!("3/3 diagnosing: the rig file and the recordings are all that bowden sees");
-    let out = folder.join("diagnosis");
-    let mut diagnose = Command::new(built("release", "bowden")?);
-    diagnose.current_dir(&folder).args([
-        "diagnose",
-        "train.csv",
-        "--heldout",
-        "heldout.csv",
-        "--rig",
-        "rig.toml",
-    ]);
-    diagnose.args(["--out", "diagnosis"]);
-    process::run(&mut diagnose, &[0, 3])?;
+    println!(
+        "3/3 investigating a joint that conceals something: the rig file and the board are all that bowden sees"
+    );
+    let mut investigate = Command::new(built("release", "bowden")?);
+    let port = format!("sim:{CONCEALED},seed={SEED}");
+    investigate.current_dir(&folder).args(["investigate", "--port", &port, "--rig", "rig.toml"]);
+    investigate.args(["--out", "investigation", "--time", JOINT_SECONDS, "--yes"]);
+    process::run(&mut investigate, &[0, 3])?;
 
-    let truth = read(&folder.join("truth.json"))?;
-    let diagnosis = read(&out.join("diagnosis.json"))?;
-    println!("\n{}", summary(&truth, &diagnosis)?);
-    let report = out.join("report.html");
+    let result = read(&out.join("investigation.json"))?;
+    let last = result["rounds"].as_array().and_then(|rounds| rounds.last());
+    let diagnosis =
+        last.and_then(|round| round["folder"].as_str()).ok_or("investigation.json: no diagnosis")?;
+    println!("\n{}", summary(&result, &read(&out.join(diagnosis).join("diagnosis.json"))?)?);
+    let report = out.join("investigate.html");
     println!("report: {}", report.display());
     println!("took {:.0} s", started.elapsed().as_secs_f64());
     show(&report);
     Ok(())
+}
+
+/// Removes what an earlier demonstration left: an investigation wants a folder of its own.
+fn clear(folder: &Path) -> Result<(), String> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(format!("{}: cannot be removed: {error}", folder.display()))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn read(path: &Path) -> Result<Value, String> {
@@ -60,14 +75,10 @@ fn read(path: &Path) -> Result<Value, String> {
     serde_json::from_str(&text).map_err(|error| format!("{shown}: not JSON: {error}"))
 }
 
-/// What was concealed, what was found, and what that gains on held-out data.
-fn summary(truth: &Value, diagnosis: &Value) -> Result<String, String> {
-    let ids = |value: &Value| -> Vec<String> {
-        value.as_array().into_iter().flatten().filter_map(|id| id.as_str().map(str::to_owned)).collect()
-    };
-    let concealed = ids(&truth["effects"]).join(", ");
+/// What was concealed, what was found, what that gains on held-out data, and how much better the joint follows.
+fn summary(investigation: &Value, diagnosis: &Value) -> Result<String, String> {
     let verdict = diagnosis["verdict"].as_str().ok_or("diagnosis.json: no verdict")?;
-    let mut lines = vec![format!("concealed: {concealed}"), format!("verdict:   {verdict}")];
+    let mut lines = vec![format!("concealed: {CONCEALED}"), format!("verdict:   {verdict}")];
     for effect in diagnosis["effects"].as_array().into_iter().flatten() {
         let text = |key: &str| effect[key].as_str().unwrap_or("?").to_owned();
         let percent = 100.0 * effect["probability"].as_f64().unwrap_or(0.0);
@@ -79,6 +90,10 @@ fn summary(truth: &Value, diagnosis: &Value) -> Result<String, String> {
         let values = [value("before_rmse"), value("recalibrated_rmse"), value("after_rmse")];
         lines.push(format!("  {channel:<15}{:>12.4}{:>14.4}{:>12.4}", values[0], values[1], values[2]));
     }
+    let error = |key: &str| investigation["verification"][key].as_f64().map(|rad| 1e3 * rad);
+    let before = error("before_rms_rad").ok_or("investigation.json: no tracking error")?;
+    let after = error("after_rms_rad").ok_or("investigation.json: no parameter was changed")?;
+    lines.push(format!("tracking error:  {before:.2} mrad before, {after:.2} mrad with the new parameters"));
     Ok(lines.join("\n"))
 }
 
@@ -99,22 +114,24 @@ mod tests {
 
     #[test]
     fn the_summary_tells_what_was_hidden_found_and_gained() {
-        let truth = json!({ "effects": ["pretension_loss"] });
+        let investigation =
+            json!({ "verification": { "before_rms_rad": 0.0093, "after_rms_rad": 0.000_89 } });
         let diagnosis = json!({
             "verdict": "missing_physics",
-            "effects": [{ "id": "pretension_loss", "probability": 0.97, "sentence": "F0 dropped at 12 s." }],
+            "effects": [{ "id": "transmission_backlash", "probability": 0.97, "sentence": "A gap of 0.02 rad." }],
             "fit": { "channels": { "f1_n": {
                 "before_rmse": 2.0, "recalibrated_rmse": 1.5, "after_rmse": 0.25, "noise_rmse": 0.1
             } } }
         });
         assert_eq!(
-            summary(&truth, &diagnosis).unwrap(),
-            "concealed: pretension_loss\n\
+            summary(&investigation, &diagnosis).unwrap(),
+            "concealed: transmission_backlash\n\
              verdict:   missing_physics\n\
-             found:     pretension_loss (97 %): F0 dropped at 12 s.\n\
+             found:     transmission_backlash (97 %): A gap of 0.02 rad.\n\
              held-out RMSE        rig file  recalibrated   diagnosed\n  \
-             f1_n                 2.0000        1.5000      0.2500"
+             f1_n                 2.0000        1.5000      0.2500\n\
+             tracking error:  9.30 mrad before, 0.89 mrad with the new parameters"
         );
-        assert!(summary(&truth, &json!({})).is_err());
+        assert!(summary(&json!({}), &diagnosis).is_err() && summary(&investigation, &json!({})).is_err());
     }
 }
