@@ -35,7 +35,7 @@ pub fn run() -> Result<(), String> {
 
     println!("2/3 writing a rig file from the parameters of a simulated driver board ({})", folder.display());
     let mut rig = Command::new(built("release", "bowden")?);
-    rig.current_dir(&folder).args(["record", "--port", "sim", "--seconds", "0.2", "--out", "rest.csv"]);
+    rig.current_dir(&folder).args(["record", "--port", "sim", "--seconds", "0.2", "--out", "joint.csv"]);
     process::run(rig.args(["--rig", "rig.toml", "--load", LOAD]), &[0])?;
 
     println!(
