@@ -387,6 +387,8 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
     /// Growth of the variance a second, per square of the mean innovation, where all tensions are measured: 0.02 doubles
     /// the weight at the default rate. Where a count makes the innovations coarser it is less, as their square is more.
     const MOVED_PER_S: f32 = 45.0;
+    /// Speed within which the observed speed of a pulley at rest is restless, rad/s.
+    const TURNING_RAD_S: f32 = 0.03;
     /// Standard deviation of `mu K/2` from which on nothing is known.
     const KNOWN: f32 = 0.08;
     let (tendon, pulley) = (&parameters.tendon, &parameters.pulley);
@@ -418,6 +420,7 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
         stretch: gain(stretch_nm, "tendon.axial_stiffness")?,
         zone: gain(ZONE_MARGIN * half_zone_rad, "tendon.axial_stiffness")?,
         play: Angle::from_f32(0.5 * ZONE_MARGIN * play_rad),
+        turning: Speed::from_f32(TURNING_RAD_S),
         joint_play: Angle::from_f32(RAD_PER_COUNT + 0.5 * backlash.enable * backlash.joint_gap),
         half_zone: gain(half_zone_rad, "tendon.axial_stiffness")?,
         angle_ratio: gain(ratio, "pulley.output_radius")?,
