@@ -41,10 +41,8 @@ fn case(
     rig: String,
     trial: Trial,
 ) -> Case {
-    let (error, shown): (fn(&Moment) -> f64, _) = match trial.mode {
-        Mode::Position => (angle_error, "mrad"),
-        Mode::Torque => (load_torque_error, "mN·m"),
-    };
+    let (error, shown): (fn(&Moment) -> f64, _) =
+        if trial.mode.follows_torque() { (load_torque_error, "mN·m") } else { (angle_error, "mrad") };
     Case { name, effect: effect.into(), rig, trial, error, shown }
 }
 
