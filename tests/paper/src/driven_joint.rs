@@ -28,6 +28,8 @@ const READY_LIMIT_S: f64 = 1.0;
 #[derive(Debug)]
 pub struct DrivenJoint {
     parameters: Parameters,
+    /// Zeros and gains of encoders and converters as they are, whatever the controller believes of them.
+    wiring: Parameters,
     controller: Controller,
     queues: Queues,
     bench: LiveBench,
@@ -97,6 +99,7 @@ impl DrivenJoint {
         Ok(Self {
             bench: LiveBench::new(bench, effects, seed)?,
             parameters,
+            wiring: Parameters::default(),
             controller,
             queues: Queues::default(),
             steps_per_tick,
@@ -255,7 +258,7 @@ impl DrivenJoint {
 
     /// What the hardware measures now.
     fn input(&mut self) -> TickInput {
-        let parameters = &self.parameters;
+        let parameters = &self.wiring;
         let channels = [
             (Channel::F1, parameters.tension.f1),
             (Channel::F2, parameters.tension.f2),
@@ -269,7 +272,7 @@ impl DrivenJoint {
         let bus_raw = code(self.bench.supply_v(), 0.0, bridge.bus_gain);
         let encoder = self.words;
         self.sequence = self.sequence.wrapping_add(1);
-        let zeros = [parameters.encoder.input.zero, parameters.encoder.joint.zero];
+        let zeros = [self.wiring.encoder.input.zero, self.wiring.encoder.joint.zero];
         for (word, (channel, zero)) in
             self.words.iter_mut().zip([Channel::ThetaIn, Channel::ThetaOut].into_iter().zip(zeros))
         {
