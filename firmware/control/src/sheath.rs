@@ -308,7 +308,8 @@ impl SheathObserver {
                 Fitted::Nothing | Fitted::Input => {}
             }
         }
-        if self.second {
+        // Not in the tick that learns from the stretch: the longest tick decides.
+        if !self.second {
             self.friction = Friction::of(config, &self.cables);
         }
         self.estimate(config, input, torque_in, slip.slips)
