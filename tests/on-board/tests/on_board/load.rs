@@ -9,8 +9,8 @@ use bowden_on_board_tests::load::under_load;
 use crate::ready;
 use crate::stop::LIVELY;
 
-/// Goals: beginning of the tick steady to 1.5 us; at most 3000 instructions, in the longest tick as well, and 20 % of 17 000
-/// cycles; compensator at most 400 instructions.
+/// Goals: beginning of the tick steady to 1.5 us; at most 3000 instructions in the longest tick; a fifth of the 17 000 cycles on
+/// average and a quarter in the longest tick; compensator at most 400 instructions.
 #[test]
 fn the_tick_keeps_its_time_at_full_load() -> Outcome {
     let mut host = ready(1)?;
@@ -19,7 +19,8 @@ fn the_tick_keeps_its_time_at_full_load() -> Outcome {
     // 1.5 us of 170 MHz.
     assert!(load.period.spread() <= 255, "{load:?}");
     assert!((load.period.mean() - 17_000.0).abs() < 1.0, "{load:?}");
-    assert!(load.tick.worst_instructions <= 3000 && load.busy.max <= 3400, "{load:?}");
+    assert!(load.tick.worst_instructions <= 3000, "{load:?}");
+    assert!(load.busy.mean() <= 3400.0 && load.busy.max <= 4250, "{load:?}");
     assert!(load.compensator.worst_instructions <= 400, "{load:?}");
     assert!(load.samples[0] >= 19_900 && load.samples[1] == 0, "{load:?}");
     assert!(load.requests >= 500, "{load:?}");
