@@ -332,9 +332,9 @@ impl Controller {
                     wanted: torque,
                     measured: readings.sheath.torque_out,
                     measured_load: readings.measured_load,
-                    motion: readings.motion,
+                    speed: readings.motion.speed,
                 };
-                torque = self.loops.yielding(&config.yielding, &config.torque, &config.drive, &input, limits);
+                torque = self.loops.yielding(&config.yielding, &config.torque, &input, limits);
             }
             (torque, command)
         };

@@ -17,16 +17,21 @@
 
 use bowden_link::{Limit, Limits};
 
-use super::{DriveConfig, Loops, TorqueConfig};
-use crate::observer::Motion;
+use super::{Loops, TorqueConfig};
 use crate::parameters::{Parameters, Reach};
-use crate::scale::{Angle, Quantity, Torque};
+use crate::scale::{Angle, Gain, Quantity, Speed, Sum, Torque};
 
 /// Limits of the hybrid mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct YieldConfig {
     /// Largest output torque `T`.
     limit: Torque,
+    /// `(1 + k)(r1/r2) T`.
+    span: Torque,
+    /// `k (r1/r2)`.
+    present: Gain<Torque, Torque>,
+    /// `b − d`.
+    drag: Gain<Speed, Torque>,
     /// Largest position error that the loop sees, at the input pulley.
     error: Angle,
 }
@@ -40,14 +45,14 @@ pub struct YieldInput {
     pub measured: Torque,
     /// Torque that the tendons take from the input pulley where it is measured, else 0.
     pub measured_load: Torque,
-    /// Observed angle and speed of the input pulley.
-    pub motion: Motion,
+    /// Observed speed of the input pulley.
+    pub speed: Speed,
 }
 
 impl YieldConfig {
-    /// Limits of a joint with these parameters.
+    /// Limits of a joint with these parameters, whose torque loop has this gain and this damping; `None` beyond fixed point.
     #[must_use]
-    pub fn new(parameters: &Parameters) -> Self {
+    pub fn new(parameters: &Parameters, gain: f32, damping: f32) -> Option<Self> {
         let (reach, controller) = (Reach::yielding(parameters), &parameters.controller);
         let natural = core::f32::consts::TAU * controller.bandwidth;
         let ratio = parameters.pulley.output_radius / parameters.pulley.input_radius;
@@ -55,7 +60,13 @@ impl YieldConfig {
         // damping the largest deceleration on the way is ω_n v/e.
         let speed = reach.speed.min(reach.acceleration * core::f32::consts::E / natural);
         let error = 2.0 * controller.damping / natural * speed * ratio;
-        Self { limit: Torque::from_f32(reach.torque), error: Angle::from_f32(error) }
+        Some(Self {
+            limit: Torque::from_f32(reach.torque),
+            span: Torque::from_f32((1.0 + gain) / ratio * reach.torque),
+            present: Gain::new(gain / ratio)?,
+            drag: Gain::new(parameters.motor.viscous - damping)?,
+            error: Angle::from_f32(error),
+        })
     }
 
     /// The angle nearest to `command` that the position loop may be asked for at `angle`.
@@ -72,27 +83,24 @@ impl Loops {
         &mut self,
         config: &YieldConfig,
         torque: &TorqueConfig,
-        drive: &DriveConfig,
         input: &YieldInput,
         limits: &mut Limits,
     ) -> Torque {
-        let YieldInput { wanted, measured, measured_load, motion } = *input;
+        let YieldInput { wanted, measured, measured_load, speed } = *input;
         let slow = self.slow.approach(torque.lead_filter, measured_load);
-        let held = torque.at_input.apply(config.limit);
-        let held = held.plus(torque.proportional.apply(held));
-        let present = torque.at_input.apply(measured);
         let middle = self
             .torque
             .value()
-            .minus(torque.proportional.apply(present))
-            .plus(drive.viscous.apply(motion.speed))
-            .minus(torque.damping.apply(motion.speed))
+            .minus(config.present.apply(measured))
+            .plus(config.drag.apply(speed))
             .minus(torque.lead.apply(measured_load.minus(slow)));
-        let bounded = middle.plus(wanted.minus(middle).limited(held));
+        let bounded = middle.plus(wanted.minus(middle).limited(config.span));
         let over = wanted.minus(bounded).to_bits().signum();
         self.yields = over as i8;
         if over == 0 {
-            self.torque.approach(torque.friction_filter, Torque::ZERO);
+            if self.torque != Sum::default() {
+                self.torque.approach(torque.friction_filter, Torque::ZERO);
+            }
         } else {
             limits.insert(Limit::OutputTorque);
             let bound = if over > 0 { config.limit } else { config.limit.negated() };
@@ -108,7 +116,7 @@ impl Loops {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scale::Speed;
+    use crate::observer::Motion;
     use crate::tick_config;
 
     fn parameters(limit: f32) -> Parameters {
@@ -121,7 +129,6 @@ mod tests {
     fn the_bounds_by_hand() {
         // r1 = r2, k = 4, b = 0.02, d = 0.2: with 0.1 N·m at the joint and 1 rad/s, 5·(±0.3) - 0.4 + 0.02 - 0.2 N·m.
         let config = tick_config(&parameters(0.3)).unwrap();
-        let motion = Motion { angle: Angle::ZERO, speed: Speed::from_f32(1.0) };
         for (wanted, expected, acts) in
             [(2.0, 0.92, true), (0.9, 0.9, false), (-2.0, -2.0, false), (-3.0, -2.08, true)]
         {
@@ -130,10 +137,9 @@ mod tests {
                 wanted: Torque::from_f32(wanted),
                 measured: Torque::from_f32(0.1),
                 measured_load: Torque::ZERO,
-                motion,
+                speed: Speed::from_f32(1.0),
             };
-            let mut bounded =
-                || loops.yielding(&config.yielding, &config.torque, &config.drive, &input, &mut limits);
+            let mut bounded = || loops.yielding(&config.yielding, &config.torque, &input, &mut limits);
             let got = bounded().to_f32();
             assert!((got - expected).abs() < 1e-5, "{wanted}: {got}");
             // k/T_i of the error a tick: 4/0.1·0.1 ms·(±0.3 - 0.1) N·m.
@@ -167,7 +173,7 @@ mod tests {
     #[test]
     fn the_error_that_is_seen_brings_the_joint_back_at_its_largest_speed_and_acceleration() {
         // Default joint: 3 rad/s, and ω_n v/e = 50.3·3/2.718 = 55.5 rad/s² where 52.8 are allowed: 2.85 rad/s·2/50.3.
-        let config = YieldConfig::new(&parameters(100.0));
+        let config = tick_config(&parameters(100.0)).unwrap().yielding;
         let far = config.command(Angle::from_f32(-1.0), Angle::from_f32(0.2)).to_f32();
         assert!((far - (0.2 - 0.1135)).abs() < 1e-3, "{far}");
         let near = Angle::from_f32(0.25);

@@ -150,6 +150,7 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
     };
     let angle = |speed: f32| shaped(speed, reach.acceleration, reach.gravity, reach.jerk);
     let range = |ends: [f32; 2]| ends.map(|end| Angle::from_f32(end).to_bits());
+    let (torque_gain, torque_damping) = torque_gains(parameters);
     Ok(TickConfig {
         rate_hz: parameters.tick_rate_hz() as u16,
         encoder: [encoder(parameters, false)?, encoder(parameters, true)?],
@@ -186,7 +187,8 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         joint: JointCorrection::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
         leads: Leads::new(parameters).ok_or_else(|| conflict("correction.reversal_speed"))?,
         lead: LeadConfig::new(parameters).ok_or_else(|| conflict("compensator.rate_limit"))?,
-        yielding: YieldConfig::new(parameters),
+        yielding: YieldConfig::new(parameters, torque_gain, torque_damping)
+            .ok_or_else(|| conflict("controller.torque_gain"))?,
         impedance: ImpedanceConfig::new(parameters).ok_or_else(|| conflict("impedance.stiffness"))?,
     })
 }
@@ -467,11 +469,8 @@ fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Re
     })
 }
 
-fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusal> {
-    /// Low-pass whose difference to the input torque is its rate, s.
-    const LEAD_FILTER_S: f32 = 0.005;
-    /// Time in which the friction that is fed forward changes sign, s.
-    const FRICTION_FILTER_S: f32 = 0.02;
+/// Gain and damping of the torque loop with the tensions that are there.
+fn torque_gains(parameters: &Parameters) -> (f32, f32) {
     /// Part of the gain, and multiple of the damping, where the output torque is estimated: there the loop only helps the
     /// input torque on its way, and what it overshoots is mistaken for friction.
     const ESTIMATED_GAIN: f32 = 0.66;
@@ -481,13 +480,22 @@ fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusa
         Fitted::All => (1.0, 1.0),
         Fitted::Nothing | Fitted::Input => (ESTIMATED_GAIN, ESTIMATED_DAMPING),
     };
-    let torque_gain = gain_part * controller.torque_gain;
+    (gain_part * controller.torque_gain, damping_part * controller.torque_damping)
+}
+
+fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusal> {
+    /// Low-pass whose difference to the input torque is its rate, s.
+    const LEAD_FILTER_S: f32 = 0.005;
+    /// Time in which the friction that is fed forward changes sign, s.
+    const FRICTION_FILTER_S: f32 = 0.02;
+    let controller = &parameters.controller;
+    let (torque_gain, damping) = torque_gains(parameters);
     let at_input = parameters.pulley.input_radius / parameters.pulley.output_radius;
     Ok(TorqueConfig {
         at_input: gain(at_input, "pulley.input_radius")?,
         proportional: gain(torque_gain, "controller.torque_gain")?,
         integral: Weight::new(torque_gain / controller.torque_integral_time * period_s),
-        damping: gain(damping_part * controller.torque_damping, "controller.torque_damping")?,
+        damping: gain(damping, "controller.torque_damping")?,
         lead: gain(controller.tension_damping / LEAD_FILTER_S, "controller.tension_damping")?,
         lead_filter: Weight::low_pass(LEAD_FILTER_S, period_s),
         friction: gain(controller.friction_feedforward, "controller.friction_feedforward")?,
