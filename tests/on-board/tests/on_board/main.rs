@@ -10,6 +10,7 @@ mod directions;
 mod failures;
 mod faults;
 mod load;
+mod modes;
 mod moved_sheath;
 mod parameters;
 mod stop;
