@@ -19,9 +19,9 @@ pub enum ModeName {
     Position,
     /// Torque at the joint, N·m
     Torque,
-    /// Angle of the joint, rad, yielding beyond limits.contact_torque
+    /// Angle of the joint, rad, yielding beyond `limits.contact_torque`
     Hybrid,
-    /// Angle of the joint, rad, as a spring and damper: impedance.stiffness, impedance.damping
+    /// Angle of the joint, rad, as a spring and damper: `impedance.stiffness`, `impedance.damping`
     Impedance,
 }
 
