@@ -6,7 +6,7 @@ use std::process::Command;
 
 use bowden::fit::recalibrate::recalibrate_study;
 use bowden::progress::Quiet;
-use bowden::recording::Recording;
+use bowden::recording::{ReadOptions, Recording};
 use bowden::rig::{Assignment, Rig};
 use bowden::simulate::{Motion, Reference, RunOptions, run};
 use bowden::study::Study;
@@ -123,7 +123,7 @@ set = { "load.mass_kg" = 1.5 }
     let error_n = |more: &[&str]| {
         let arguments = [&["replay", "light.csv", "--out", "p.csv"][..], &fitted_rig, more].concat();
         assert_eq!(bowden(folder, &arguments).0, 0);
-        let read = |file: &str| Recording::load(&folder.join(file), &Default::default()).unwrap();
+        let read = |file: &str| Recording::load(&folder.join(file), &ReadOptions::default()).unwrap();
         let [measured, predicted] = ["light.csv", "p.csv"].map(read);
         let f2 = |r: &Recording| r.channel(bowden_model::channel::Channel::F2).unwrap().to_vec();
         let squares = f2(&measured).iter().zip(f2(&predicted)).map(|(a, b)| (a - b).powi(2)).sum::<f64>();

@@ -52,7 +52,7 @@ impl Outcome {
         let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
         let diagnosed = diagnose(&rig, &[training], &[], asked, &Quiet).unwrap();
         let mut document = RigDocument::parse(&case.rig_toml(), "rig.toml").unwrap();
-        diagnosed.write_into(&mut document).unwrap();
+        diagnosed.write_into(0, &mut document).unwrap();
         let found = Rig::parse(&document.to_string(), "rig.diagnosed.toml").unwrap();
         let outcome = Self {
             diagnosis: diagnosed.findings.diagnosis,

@@ -56,14 +56,14 @@ fn a_fit_to_the_virtual_bench_recovers_its_parameters() {
     let result = recalibrate(&rig, &[recording], &Quiet).unwrap();
     let truth = case.truth_record();
     for (name, short, tolerance) in [
-        ("friction_coefficient", "mu", 0.02),
-        ("axial_stiffness_n", "ea", 0.02),
-        ("pretension_n", "f0", 0.01),
-        ("torque_constant_nm_per_a", "kt", 0.025),
-        ("resistance_ohm", "res", 0.025),
-        ("mass_kg", "m", 0.01),
+        ("sheath.friction_coefficient", "mu", 0.02),
+        ("tendon.axial_stiffness_n", "ea", 0.02),
+        ("tendon.pretension_n", "f0", 0.01),
+        ("motor.torque_constant_nm_per_a", "kt", 0.025),
+        ("motor.resistance_ohm", "res", 0.025),
+        ("load.mass_kg", "m", 0.01),
     ] {
-        let found = result.parameters.iter().find(|p| p.name == name).unwrap();
+        let found = result.parameters.iter().find(|p| p.parameter.to_string() == name).unwrap();
         let expected = truth["true_over_nominal"][short].as_f64().unwrap();
         let ratio = found.fitted / found.nominal;
         assert!((ratio / expected - 1.0).abs() < tolerance, "{name}: {ratio} for {expected}");

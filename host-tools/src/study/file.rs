@@ -72,9 +72,10 @@ impl StudyFile {
         for section in file.sections("recording", "recording")? {
             let recording = read_recording(&section, folder, &benches)?;
             if let Some(twice) = recordings.iter().find(|other| is_same(&other.path, &recording.path)) {
-                let reason = match twice.heldout == recording.heldout {
-                    true => "is listed twice; list it once",
-                    false => "is listed as held out and not; a judge must be another recording",
+                let reason = if twice.heldout == recording.heldout {
+                    "is listed twice; list it once"
+                } else {
+                    "is listed as held out and not; a judge must be another recording"
                 };
                 return Err(source.at(&section.span, format!("{} {reason}", recording.path.display())));
             }
