@@ -4,6 +4,7 @@ mod boot;
 mod bridge;
 mod closed_loop;
 mod conformance;
+mod corrections;
 mod coverage;
 mod determinism;
 mod directions;
