@@ -308,8 +308,7 @@ impl SheathObserver {
                 Fitted::Nothing | Fitted::Input => {}
             }
         }
-        // Not in the tick that learns from the stretch: the longest tick decides.
-        if !self.second {
+        if self.second {
             self.friction = Friction::of(config, &self.cables);
         }
         self.estimate(config, input, torque_in, slip.slips)
