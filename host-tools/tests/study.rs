@@ -233,3 +233,19 @@ fn unusable_studies_are_refused_in_one_line() {
         assert!(status == 2 && errors.contains(reason) && errors.trim_end().lines().count() == 1, "{errors}");
     }
 }
+
+/// The study that README begins with: eleven recordings of a real servo under four gains, from its data sheet.
+#[test]
+fn the_servos_study_names_the_friction_of_its_gear() {
+    let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/xl330-pendulum/study.toml");
+    let study = Study::load(&study).unwrap();
+    assert_eq!((study.benches.len(), study.recordings.len()), (1, 11));
+    let diagnosis = bowden::diagnose::diagnose_study(&study, &[], &Quiet).unwrap().findings.diagnosis;
+    let named: Vec<&str> = diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
+    assert_eq!(named, ["gear_load_friction"]);
+    // 0.1583 and 0.1144 rad on the four recordings that took no part.
+    let angle = &diagnosis.fit.channels["theta_out_rad"];
+    assert!((angle.before_rmse - 0.1583).abs() < 2e-4, "{angle:?}");
+    assert!((0.105..0.12).contains(&angle.after_rmse), "{angle:?}");
+    assert!(diagnosis.unexplained.is_some(), "the servo is not explained by it alone");
+}
