@@ -55,7 +55,7 @@ fn number(value: &Value) -> f64 {
 fn play_is_found_and_made_up_for() {
     let folder = folder();
     let port = "sim:transmission_backlash:1,seed=601";
-    let (status, stdout, stderr) = run(folder.path(), port, &["--yes", "--time", "48"]);
+    let (status, stdout, stderr) = run(folder.path(), port, &["--yes", "--time", "90"]);
     assert_eq!((status, stderr.as_str()), (0, ""), "{stdout}");
     let result = result(folder.path());
     let last = result["rounds"].as_array().unwrap().last().unwrap();

@@ -14,7 +14,7 @@ const CONCEALED: &str = "transmission_backlash";
 const SEED: &str = "11";
 
 /// Time that the joint is driven, s of the simulated board.
-const JOINT_SECONDS: &str = "60";
+const JOINT_SECONDS: &str = "90";
 
 /// Weight on the arm of the simulated joint and its distance from the axis, kg and m.
 const LOAD: &str = "2.5,0.03";

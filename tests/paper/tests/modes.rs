@@ -17,6 +17,8 @@ const FRICTION_NM: f64 = 2.0 * 30.0 * 0.015 * 0.12 * PI;
 const GAIN: f64 = 5.0;
 /// Half a count of the joint's encoder \[rad\].
 const HALF_COUNT_RAD: f64 = PI / 4096.0;
+/// Half a code of a tension's converter, 98.0665 N in 12 bits, at the joint's pulley of 15 mm.
+const HALF_CODE_NM: f64 = 0.5 * 98.0665 / 4096.0 * 0.015;
 /// m g l \[Nm\].
 const WEIGHT_NM: f64 = 2.5 * 9.81 * 0.03;
 
@@ -52,11 +54,11 @@ fn held_tick(joint: &mut DrivenJoint, place_rad: f64, speed_rad_s: f64) -> (f64,
 }
 
 /// At rest the torque loop is as far off as a sheath that sticks lets it be: its integral has not yet moved the pulley by the
-/// width `2 M` of the friction, `(1 + k_T + k_T t/T_i) e < 2 M`.
+/// width `2 M` of the friction, `(1 + k_T + k_T t/T_i) e < 2 M`; and each of the two tensions is read to half a code.
 #[test]
 fn an_outer_torque_turns_the_joint_by_torque_over_stiffness() {
     const WAIT_S: f64 = 2.0;
-    let torque_off_nm = 2.0 * FRICTION_NM / (GAIN + 4.0 * WAIT_S / 0.1);
+    let torque_off_nm = 2.0 * FRICTION_NM / (GAIN + 4.0 * WAIT_S / 0.1) + 2.0 * HALF_CODE_NM;
     for stiffness in [1.0_f32, 2.0, 5.0, 16.0] {
         let own = parameters(|parameters| parameters.impedance.stiffness = stiffness);
         let mut joint = running(Mode::Impedance, own, Reference::Hold(0.0));
