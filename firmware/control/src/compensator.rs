@@ -37,10 +37,8 @@ pub struct CompensatorInput {
     pub friction: Angle,
     /// The cables slip in the direction of the present travel.
     pub slips: bool,
-    /// Measured angle of the input pulley.
-    pub theta_in: Angle,
-    /// Measured angle of the joint.
-    pub theta_out: Angle,
+    /// Measured angle of the input pulley less that of the joint, `theta_in - (r2/r1) theta_out` of Eq. (22).
+    pub lag: Angle,
 }
 
 /// Result of a tick.
@@ -68,7 +66,7 @@ impl CompensatorState {
     /// Starts without a jump: the lag is the one that the encoders show, as far as its limit allows.
     #[must_use]
     pub fn starting_at(config: &Compensator, input: &CompensatorInput) -> Self {
-        let lag = input.theta_in.minus(config.at_input(input.theta_out)).limited(config.size_limit);
+        let lag = input.lag.limited(config.size_limit);
         Self { target: Sum::at(lag), theta_f: lag, torque: Sum::at(input.torque_out), backward: false }
     }
 }
@@ -96,9 +94,8 @@ pub fn compensate(
             state.target = Sum::at(config.stretch.apply(torque).minus(input.friction));
         }
         Source::Encoders if forward || backward => {
-            let lag = input.theta_in.minus(config.at_input(input.theta_out));
             // Limited ahead of the sum, so that the sum never has to come back from afar.
-            state.target.approach(config.follow, lag.limited(config.size_limit));
+            state.target.approach(config.follow, input.lag.limited(config.size_limit));
         }
         Source::Adaptive => {
             if forward || backward {
@@ -106,8 +103,7 @@ pub fn compensate(
             }
             // What the lag has beyond friction, stretch under the load, changes with the load and not at a turn.
             if input.slips && (forward || backward) {
-                let lag = input.theta_in.minus(config.at_input(input.theta_out));
-                let stretch = lag.limited(config.size_limit).minus(signed(input.friction, backward));
+                let stretch = input.lag.limited(config.size_limit).minus(signed(input.friction, backward));
                 state.target.approach(config.follow, stretch);
             }
         }

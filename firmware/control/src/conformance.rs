@@ -55,7 +55,7 @@ fn run_with(seed: u32, ticks: u32, prepare: fn(&mut Parameters)) -> Outcome {
         };
         let mut state = CompensatorState::default();
         for _ in 0..ticks {
-            let input = compensator_input(&mut random);
+            let input = compensator_input(&compensator, &mut random);
             let output = compensate(&compensator, &mut state, &input);
             hash.word(output.theta_c.to_bits().cast_unsigned());
             hash.word(output.theta_f.to_bits().cast_unsigned());
@@ -102,8 +102,11 @@ pub fn compensator_digest(seed: u32, inputs: u32) -> u32 {
         };
         let mut state = CompensatorState::default();
         for _ in 0..INPUTS_A_SET {
-            let input =
-                if random.rarely(4) { edges.input(&mut random) } else { compensator_input(&mut random) };
+            let input = if random.rarely(4) {
+                edges.input(&compensator, &mut random)
+            } else {
+                compensator_input(&compensator, &mut random)
+            };
             let output = compensate(&compensator, &mut state, &input);
             hash.word(output.theta_c.to_bits().cast_unsigned());
             hash.word(output.theta_f.to_bits().cast_unsigned());
@@ -120,7 +123,7 @@ struct Edges {
 }
 
 impl Edges {
-    fn input(&self, random: &mut Random) -> CompensatorInput {
+    fn input(&self, config: &Compensator, random: &mut Random) -> CompensatorInput {
         let mut near = |edge: i32| {
             let edge = if random.rarely(2) { edge } else { edge.wrapping_neg() };
             match random.below(8) {
@@ -135,8 +138,7 @@ impl Edges {
             torque_out: Torque::from_bits(near(0)),
             friction: Angle::from_bits(near(self.size)),
             slips: near(0) >= 0,
-            theta_in: Angle::from_bits(near(self.size)),
-            theta_out: Angle::from_bits(near(0)),
+            lag: lag(config, near(self.size), near(0)),
         }
     }
 }
@@ -228,7 +230,12 @@ fn parameters(source: u8, random: &mut Random) -> Parameters {
     parameters
 }
 
-fn compensator_input(random: &mut Random) -> CompensatorInput {
+/// Lag between these angles of input pulley and joint.
+fn lag(config: &Compensator, theta_in: i32, theta_out: i32) -> Angle {
+    Angle::from_bits(theta_in).minus(config.at_input(Angle::from_bits(theta_out)))
+}
+
+fn compensator_input(config: &Compensator, random: &mut Random) -> CompensatorInput {
     if random.rarely(4) {
         return CompensatorInput {
             theta_d: Angle::from_bits(random.wild()),
@@ -236,8 +243,7 @@ fn compensator_input(random: &mut Random) -> CompensatorInput {
             torque_out: Torque::from_bits(random.wild()),
             friction: Angle::from_bits(random.wild()),
             slips: random.rarely(2),
-            theta_in: Angle::from_bits(random.wild()),
-            theta_out: Angle::from_bits(random.wild()),
+            lag: lag(config, random.wild(), random.wild()),
         };
     }
     // Within 2 rad, 2 rad/s and 2 N·m.
@@ -248,8 +254,7 @@ fn compensator_input(random: &mut Random) -> CompensatorInput {
         torque_out: Torque::from_bits(small()),
         friction: Angle::from_bits(small()),
         slips: small() >= 0,
-        theta_in: Angle::from_bits(small()),
-        theta_out: Angle::from_bits(small()),
+        lag: lag(config, small(), small()),
     }
 }
 

@@ -51,6 +51,8 @@ pub struct Controller {
 struct Readings {
     counts: [i32; 2],
     theta: [Angle; 2],
+    /// `theta_in - (r2/r1) theta_out`.
+    lag: Angle,
     motion: Motion,
     tensions: [Tension; 4],
     /// Torque that the tendons take from the input pulley, for the position loop.
@@ -206,7 +208,8 @@ impl Controller {
             measured_load,
         );
         let checks = self.supervisor.tension_checks();
-        let lag = theta[0].minus(config.compensator.at_input(theta[1]));
+        let theta_out_at_input = config.compensator.at_input(theta[1]);
+        let lag = theta[0].minus(theta_out_at_input);
         let tension = self.tensions.watch(&config.tension, checks, input.tension_raw, tensions, lag);
         let measured = SheathInput {
             tensions,
@@ -215,6 +218,7 @@ impl Controller {
             current: supply.current,
             motion,
             theta_out: theta[1],
+            theta_out_at_input,
         };
         let sheath = self.sheaths.observe(&config.sheath, &measured);
         let load = if motor_side { torque_in } else { self.observer.load(&config.observer) };
@@ -228,7 +232,7 @@ impl Controller {
             None
         };
         let (current, bus) = (supply.current, supply.bus_filtered);
-        Readings { counts, theta, motion, tensions, load, measured_load, sheath, current, bus, found }
+        Readings { counts, theta, lag, motion, tensions, load, measured_load, sheath, current, bus, found }
     }
 
     fn stand_still(&mut self, counts: [i32; 2]) -> Option<Detection> {
@@ -254,8 +258,7 @@ impl Controller {
             torque_out: readings.sheath.torque_out,
             friction: readings.sheath.friction_angle,
             slips: readings.sheath.slips,
-            theta_in: readings.theta[0],
-            theta_out: readings.theta[1],
+            lag: readings.lag,
             ..CompensatorInput::default()
         };
         if self.starts {

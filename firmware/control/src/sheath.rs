@@ -21,9 +21,9 @@
 //! When a cable slips. Friction never exceeds its limit, so a difference above the present `q` proves that `q` is too small,
 //! whatever the cable does. A difference below it says that `q` is too large only where the cable slips: at an end of the dead
 //! zone, a play of the input pulley as wide as the present `q` says and a fifth more. A `q` that is too large makes the zone
-//! wider, one that is too small is raised, so both settle at the truth. Where the ends at the joint are not measured, a joint that goes more than a count the way that the
-//! pulley goes proves slip too, however wide the zone was thought to be: friction that fell while the zone was crossed is
-//! known a count later.
+//! wider, one that is too small is raised, so both settle at the truth. Where the ends at the joint are not measured, a joint
+//! that goes more than a count the way that the pulley goes proves slip too, however wide the zone was thought to be: friction
+//! that fell while the zone was crossed is known a count later.
 //!
 //! How much a tick counts is a scalar Kalman filter: the variance of `q` grows with time, faster while innovations stay on
 //! one side (the sheath is being moved), and shrinks with each tick of slip. A variance above [`SheathConfig::known_below`]
@@ -84,8 +84,6 @@ pub struct SheathConfig {
     pub turning: Speed,
     /// `F0 L/(EA r1)`: half of the dead zone at the input pulley, per `q`.
     pub half_zone: Gain<Ratio, Angle>,
-    /// `r2/r1`: angle of the joint at the input pulley.
-    pub angle_ratio: Gain<Angle, Angle>,
     /// `r2/r1`: torque of the input pulley at the joint.
     pub torque_ratio: Gain<Torque, Torque>,
     /// `k_t N`: torque of the motor at the input pulley.
@@ -123,6 +121,8 @@ pub struct SheathInput {
     pub motion: Motion,
     /// Measured angle of the joint.
     pub theta_out: Angle,
+    /// The same at the input pulley, `(r2/r1) theta_out`.
+    pub theta_out_at_input: Angle,
 }
 
 /// What is known of the sheaths after a tick.
@@ -364,7 +364,7 @@ impl SheathObserver {
         let [cable, other] = &mut self.cables;
         cable.age(config);
         let ratio = cable.ratio.value();
-        let lag = input.motion.angle.minus(config.angle_ratio.apply(input.theta_out));
+        let lag = input.motion.angle.minus(input.theta_out_at_input);
         let bent = exponent_per_ratio(ratio);
         let both = |lag: Angle| bent.of(config.stretch.apply(lag));
         let friction = config.friction.apply(ratio.times(bent));
@@ -513,6 +513,7 @@ mod tests {
                     speed: Speed::from_f32(speed as f32),
                 },
                 theta_out: Angle::from_f32(counted_rad as f32),
+                theta_out_at_input: Angle::from_f32(counted_rad as f32),
             };
             estimate = observer.observe(config, &input);
         }

@@ -100,22 +100,12 @@ pub struct SupervisorConfig {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Supervisor {
     state: State,
-    mode: Mode2,
+    mode: Mode,
     fault: Option<FaultRecord>,
     /// Ticks since this state was entered.
     elapsed: u32,
     dwell: u16,
     rest: rest::RestLook,
-}
-
-/// [`Mode`] with a default.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Mode2 {
-    #[default]
-    Position,
-    Torque,
-    Hybrid,
-    Impedance,
 }
 
 /// What the supervisor looks at.
@@ -145,12 +135,7 @@ impl Supervisor {
     /// What the reference of a run means.
     #[must_use]
     pub const fn mode(&self) -> Mode {
-        match self.mode {
-            Mode2::Position => Mode::Position,
-            Mode2::Torque => Mode::Torque,
-            Mode2::Hybrid => Mode::Hybrid,
-            Mode2::Impedance => Mode::Impedance,
-        }
+        self.mode
     }
 
     /// Fault that waits to be cleared.
@@ -187,16 +172,11 @@ impl Supervisor {
             }
             Goal::Ready => State::SelfTest,
             Goal::Home => {
-                self.mode = Mode2::Position;
+                self.mode = Mode::Position;
                 State::Homing
             }
             Goal::Run(mode) => {
-                self.mode = match mode {
-                    Mode::Position => Mode2::Position,
-                    Mode::Torque => Mode2::Torque,
-                    Mode::Hybrid => Mode2::Hybrid,
-                    Mode::Impedance => Mode2::Impedance,
-                };
+                self.mode = mode;
                 State::Run
             }
         };

@@ -181,14 +181,15 @@ fn encoder_source_settles_at_the_measured_lag() {
         let reference = CompensatorConfig::new(pair(&parameters), 0.0).unwrap();
         let ratio = f64::from(parameters.pulley.output_radius) / f64::from(parameters.pulley.input_radius);
         let theta_out = random.between(-1.0, 1.0);
+        let theta_in = Angle::from_f32((ratio * theta_out + random.between(-0.1, 0.1)) as f32);
+        let theta_out = Angle::from_f32(theta_out as f32);
         let input = CompensatorInput {
-            theta_d: Angle::from_f32(theta_out as f32),
+            theta_d: theta_out,
             omega_d: Speed::from_f32(0.5),
             torque_out: Torque::ZERO,
             friction: Angle::ZERO,
             slips: true,
-            theta_in: Angle::from_f32((ratio * theta_out + random.between(-0.1, 0.1)) as f32),
-            theta_out: Angle::from_f32(theta_out as f32),
+            lag: theta_in.minus(config.at_input(theta_out)),
         };
         let mut state = CompensatorState::default();
         let mut got = compensate(&config, &mut state, &input);
@@ -197,10 +198,7 @@ fn encoder_source_settles_at_the_measured_lag() {
             got = compensate(&config, &mut state, &input);
         }
         let value = |angle: Angle| f64::from(angle.to_bits()) * STEP;
-        let lag = LagSource::Encoders {
-            theta_in_rad: value(input.theta_in),
-            theta_out_rad: value(input.theta_out),
-        };
+        let lag = LagSource::Encoders { theta_in_rad: value(theta_in), theta_out_rad: value(theta_out) };
         let expected = ReferenceState::new().step(&reference, value(input.theta_d), 0.5, lag).unwrap();
         errors.add((value(got.theta_c) - expected.theta_c_rad) / STEP);
     }
@@ -291,8 +289,7 @@ fn extremes_saturate() {
                         torque_out: Torque::from_bits(torque),
                         friction: Angle::from_bits(omega),
                         slips: omega > 0,
-                        theta_in: Angle::from_bits(torque),
-                        theta_out: Angle::from_bits(theta),
+                        lag: Angle::from_bits(torque).minus(config.at_input(Angle::from_bits(theta))),
                     };
                     let mut state = CompensatorState::starting_at(&config, &input);
                     let mut got = compensate(&config, &mut state, &input);

@@ -181,10 +181,11 @@ pub enum Provocation {
 }
 
 /// What a reference means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
     /// Angle of the joint, rad.
+    #[default]
     Position,
     /// Torque at the joint, N·m.
     Torque,

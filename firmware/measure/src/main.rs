@@ -185,8 +185,7 @@ impl Bench {
                 torque_out: Torque::from_bits(small()),
                 friction: Angle::from_bits(small()),
                 slips: small() > 0,
-                theta_in: Angle::from_bits(small()),
-                theta_out: Angle::from_bits(small()),
+                lag: Angle::from_bits(small()),
             };
             let float_input = FloatInput {
                 theta_d_rad: input.theta_d.to_f32(),
@@ -194,8 +193,7 @@ impl Bench {
                 torque_out_nm: input.torque_out.to_f32(),
                 friction_rad: input.friction.to_f32(),
                 slips: input.slips,
-                theta_in_rad: input.theta_in.to_f32(),
-                theta_out_rad: input.theta_out.to_f32(),
+                lag_rad: input.lag.to_f32(),
             };
             black_box(compensate(&fixed, &mut fixed_state, black_box(&input)));
             black_box(compensate_float(&float, &mut float_state, black_box(&float_input)));

@@ -17,6 +17,19 @@ pub enum Source {
     Adaptive,
 }
 
+impl Source {
+    /// The source that `compensator.source` names.
+    #[must_use]
+    pub const fn of(parameters: &Parameters) -> Self {
+        match parameters.compensator.source as i32 {
+            1 => Self::Torque,
+            2 => Self::Encoders,
+            3 => Self::Adaptive,
+            _ => Self::Off,
+        }
+    }
+}
+
 /// Angles a torque and a direction make, in SI units: Eq. (20) from the output torque, times r2/r1 for the input pulley.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LagAngles {
@@ -68,14 +81,8 @@ impl Compensator {
         let angles = LagAngles::new(parameters);
         let compensation = &parameters.compensator;
         let period_s = 1.0 / parameters.tick_rate_hz();
-        let source = match compensation.source as i32 {
-            1 => Source::Torque,
-            2 => Source::Encoders,
-            3 => Source::Adaptive,
-            _ => Source::Off,
-        };
         Some(Self {
-            source,
+            source: Source::of(parameters),
             ratio: Gain::new(angles.ratio)?,
             stretch: Gain::new(angles.stretch_rad_per_nm)?,
             threshold: Speed::from_f32(compensation.speed_threshold),

@@ -28,10 +28,8 @@ pub struct FloatInput {
     pub friction_rad: f32,
     /// The cables slip in the direction of the present travel.
     pub slips: bool,
-    /// Measured angle of the input pulley, rad.
-    pub theta_in_rad: f32,
-    /// Measured angle of the joint, rad.
-    pub theta_out_rad: f32,
+    /// Measured angle of the input pulley less that of the joint, `theta_in - (r2/r1) theta_out`, rad.
+    pub lag_rad: f32,
 }
 
 /// State of the compensator.
@@ -50,12 +48,7 @@ impl FloatCompensator {
         let compensation = &parameters.compensator;
         let period_s = 1.0 / parameters.tick_rate_hz();
         Self {
-            source: match compensation.source as i32 {
-                1 => Source::Torque,
-                2 => Source::Encoders,
-                3 => Source::Adaptive,
-                _ => Source::Off,
-            },
+            source: Source::of(parameters),
             angles: LagAngles::new(parameters),
             threshold_rad_s: compensation.speed_threshold,
             step_limit_rad: compensation.rate_limit * period_s,
@@ -79,8 +72,7 @@ pub fn compensate_float(config: &FloatCompensator, state: &mut FloatState, input
         Source::Torque if forward => state.target_rad = stretch_rad + input.friction_rad,
         Source::Torque if backward => state.target_rad = stretch_rad - input.friction_rad,
         Source::Encoders if forward || backward => {
-            let lag_rad = input.theta_in_rad - config.angles.ratio * input.theta_out_rad;
-            let lag_rad = within(lag_rad, config.size_limit_rad);
+            let lag_rad = within(input.lag_rad, config.size_limit_rad);
             state.target_rad += config.follow_weight * (lag_rad - state.target_rad);
         }
         Source::Adaptive => {
@@ -88,9 +80,8 @@ pub fn compensate_float(config: &FloatCompensator, state: &mut FloatState, input
                 state.backward = backward;
             }
             if input.slips && (forward || backward) {
-                let lag_rad = input.theta_in_rad - config.angles.ratio * input.theta_out_rad;
                 let friction_rad = if backward { -input.friction_rad } else { input.friction_rad };
-                let stretch_rad = within(lag_rad, config.size_limit_rad) - friction_rad;
+                let stretch_rad = within(input.lag_rad, config.size_limit_rad) - friction_rad;
                 state.target_rad += config.follow_weight * (stretch_rad - state.target_rad);
             }
         }

@@ -6,7 +6,7 @@
 //! there when the torque is: `theta_c += c T`, `c` the stretch at the input pulley a torque of Eq. (20).
 
 use super::shape::SmoothSign;
-use crate::compensator::LagAngles;
+use crate::compensator::{LagAngles, Source};
 use crate::parameters::Parameters;
 use crate::scale::{Angle, Gain, Quantity, Share, Speed, Torque};
 
@@ -60,7 +60,7 @@ impl JointCorrection {
     #[must_use]
     pub fn new(parameters: &Parameters) -> Option<Self> {
         let angles = LagAngles::new(parameters);
-        let from_torque = parameters.compensator.source == 1.0;
+        let from_torque = Source::of(parameters) == Source::Torque;
         Some(Self {
             direction: SmoothSign::new(parameters.correction.reversal_speed / angles.ratio)?,
             friction: JointFriction::new(parameters),

@@ -7,7 +7,7 @@ use bowden_link::message::{Reference, Refusal};
 use micromath::F32Ext;
 
 use super::{Parameters, Reach};
-use crate::compensator::Compensator;
+use crate::compensator::{Compensator, Source};
 use crate::correction::MotorCorrection;
 use crate::correction::dead_zone::DeadZone;
 use crate::correction::eccentricity::Eccentricity;
@@ -425,7 +425,6 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
         turning: Speed::from_f32(TURNING_RAD_S),
         joint_play: Angle::from_f32(RAD_PER_COUNT + 0.5 * backlash.enable * backlash.joint_gap),
         half_zone: gain(half_zone_rad, "tendon.axial_stiffness")?,
-        angle_ratio: gain(ratio, "pulley.output_radius")?,
         torque_ratio: gain(ratio, "pulley.output_radius")?,
         drive: gain(torque_constant(parameters), "motor.torque_constant")?,
         viscous: gain(parameters.motor.viscous, "motor.viscous")?,
@@ -438,9 +437,6 @@ fn sheath(parameters: &Parameters, period_s: f32) -> Result<SheathConfig, Refusa
         known_below: Ratio::from_f32(KNOWN * KNOWN),
     })
 }
-
-/// `compensator.source`: friction as it is followed.
-const ADAPTIVE: f32 = 3.0;
 
 fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Refusal> {
     /// Low-pass of the reference's acceleration, s. Lag of a 1.5 Hz sine: 5°.
@@ -461,7 +457,7 @@ fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Re
         acceleration_filter: Weight::low_pass(ACCELERATION_FILTER_S, period_s),
         load_feedforward: gain(controller.load_feedforward, "controller.load_feedforward")?,
         half_count: Angle::from_f32(0.5 * RAD_PER_COUNT),
-        ring: if parameters.compensator.source == ADAPTIVE && fitted(parameters) != Fitted::Nothing {
+        ring: if Source::of(parameters) == Source::Adaptive && fitted(parameters) != Fitted::Nothing {
             Some(RingConfig::new(parameters).ok_or_else(|| conflict("controller.tension_damping"))?)
         } else {
             None
