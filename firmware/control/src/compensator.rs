@@ -71,8 +71,8 @@ impl CompensatorState {
     }
 }
 
-/// One tick: 84 instructions of a Cortex-M4 with the source off, 104 from the torque, 116 from the encoders; kept out of
-/// line so that they can be counted. [`float::compensate_float`] takes 89, 95 and 136 with the FPU.
+/// One tick: 82 instructions of a Cortex-M4 with the source off, 101 from the torque, 102 from the encoders; kept out of
+/// line so that they can be counted. [`float::compensate_float`] takes 89, 95 and 133 with the FPU.
 ///
 /// Error against `bowden-model` in f64, in slip and settled: at most 2.2 steps of 2⁻²⁰ rad, RMS 0.7, bias 0.25 (test
 /// `errors_against_f64`; measured 1.4, 0.49, 0.01).
