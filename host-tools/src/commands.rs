@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::recording::Recording;
-use crate::study::Study;
+use crate::study::LoadedStudy;
 
 /// Writes a result to standard output. A reader that left early (`bowden check ... | head -1`) is no failure.
 ///
@@ -36,13 +36,17 @@ pub fn print(text: &str) -> Result<(), Failure> {
 }
 
 /// The study that a command line names: a study file, or recordings with the rig of their bench.
-fn load_study(recordings: &[PathBuf], rig: Option<&Path>, heldout: &[PathBuf]) -> Result<Study, Failure> {
-    match (recordings.iter().find(|path| Study::is_named_by(path)), rig) {
-        (None, Some(rig)) => Study::of_one_bench(rig, recordings, heldout),
+fn load_study(
+    recordings: &[PathBuf],
+    rig: Option<&Path>,
+    heldout: &[PathBuf],
+) -> Result<LoadedStudy, Failure> {
+    match (recordings.iter().find(|path| LoadedStudy::is_named_by(path)), rig) {
+        (None, Some(rig)) => LoadedStudy::of_one_bench(rig, recordings, heldout),
         (None, None) => Err(Failure::bad_input(
             "no rig; name it with --rig RIG.toml, or give one study file (.toml) instead",
         )),
-        (Some(study), None) if recordings.len() == 1 && heldout.is_empty() => Study::load(study),
+        (Some(study), None) if recordings.len() == 1 && heldout.is_empty() => LoadedStudy::load(study),
         (Some(study), _) => Err(Failure::bad_input(format!(
             "{}: a study names its rigs and recordings itself; leave out --rig, --heldout and other recordings, or give \
              recordings (.csv, .csv.gz, .mcap) in place of it",

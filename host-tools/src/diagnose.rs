@@ -110,41 +110,12 @@ impl Diagnosed {
     }
 }
 
-/// Diagnoses `training`, and proves the result on `heldout`; without held-out recordings, stretches of the training
-/// recordings are held out. Effects that are tried on request only are tried if they are among `asked`.
+/// Diagnoses the recordings of a study together, and proves the result on those that are held out; where none is, stretches of
+/// the others are. Effects that are tried on request only are tried if they are among `asked`.
 ///
 /// # Errors
-/// When the recordings cannot drive the rig or hold nothing to compare.
-pub fn diagnose(
-    rig: &Rig,
-    training: &[Recording],
-    heldout: &[Recording],
-    asked: &[&str],
-    progress: &dyn Progress,
-) -> Result<Diagnosed, Failure> {
-    let first =
-        training.first().ok_or_else(|| Failure::bad_input("no recording to diagnose; name at least one"))?;
-    let model = JointModel::from_rig(rig, first)?;
-    let objective = Objective::new(&model, training, heldout, heldout.is_empty())?;
-    let whole = Variation::new(model.clone(), 0, &model, Vec::new(), Vec::new());
-    let [training, heldout] = [training, heldout].map(|recordings| recordings.iter().collect());
-    let case = Case {
-        rig,
-        name: &rig.name,
-        training,
-        heldout,
-        objective: &objective,
-        model: &model,
-        benches: vec![(&rig.name, whole)],
-    };
-    case.diagnosed(asked, progress)
-}
-
-/// Diagnoses the recordings of a study together. Effects that are tried on request only are tried if they are among `asked`.
-///
-/// # Errors
-/// When a recording cannot drive its rig, or nothing can be compared.
-pub fn diagnose_study(study: &Study, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
+/// When there is no recording to learn from, one cannot drive its rig, or nothing can be compared.
+pub fn diagnose(study: &Study, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
     let model = study.joint()?;
     let training: Vec<&Recording> = study.recordings_where(false).collect();
     let heldout: Vec<&Recording> = study.recordings_where(true).collect();

@@ -8,18 +8,7 @@ use bowden_model::plant::{InputBoundary, OutputBoundary, PlantConfig};
 
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::rig::{Controller, ControllerParameter, Rig, RigParameter};
-
-/// Law of a servo that turns the error of its angle into a duty, `d = clamp(k (θ_ref - θ), ±d_max)`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ServoLaw {
-    /// Proportional gain k, duty per rad.
-    pub gain_duty_per_rad: f64,
-    /// Largest duty.
-    pub duty_limit: f64,
-    /// Time between the measurement and the duty that follows from it, s.
-    pub delay_s: f64,
-}
+use crate::rig::{ProportionalLaw, Rig, RigParameter};
 
 /// Shortest simulation step, s: a second of a joint that needs shorter ones takes more than a minute.
 const SHORTEST_STEP_S: f64 = 1e-7;
@@ -56,7 +45,7 @@ pub struct JointModel {
     /// Longest simulation step, s.
     pub step_s: f64,
     /// Servo, where the duty follows from the reference.
-    pub servo: Option<ServoLaw>,
+    pub servo: Option<ProportionalLaw>,
     /// Channels that drive a replay.
     pub inputs: Vec<Channel>,
     /// Channels that a replay predicts.
@@ -151,40 +140,12 @@ impl JointModel {
     /// Value of a parameter; `None` where the joint lacks the part or the effect. Of several instances of an effect the first counts.
     #[must_use]
     pub fn value(&self, parameter: &RigParameter) -> Option<f64> {
-        match parameter {
-            RigParameter::Nominal(parameter) => parameter.get(&self.parameters),
-            RigParameter::Effect { descriptor, index } => {
-                let instance = self.effects.iter().find(|active| active.descriptor().id == descriptor.id);
-                instance.map(|active| active.parameters[*index])
-            }
-            RigParameter::Controller(parameter) => self.servo.as_ref().map(|servo| match parameter {
-                ControllerParameter::Gain => servo.gain_duty_per_rad,
-                ControllerParameter::DutyLimit => servo.duty_limit,
-                ControllerParameter::Delay => servo.delay_s,
-            }),
-        }
+        parameter.value_in(&self.parameters, &self.effects, self.servo.as_ref())
     }
 
     /// Replaces the value of a parameter; does nothing where [`Self::value`] finds none.
     pub fn set_value(&mut self, parameter: &RigParameter, value: f64) {
-        match parameter {
-            RigParameter::Nominal(parameter) => parameter.set(&mut self.parameters, value),
-            RigParameter::Effect { descriptor, index } => {
-                let is_meant = |active: &&mut ActiveEffect| active.descriptor().id == descriptor.id;
-                if let Some(active) = self.effects.iter_mut().find(is_meant) {
-                    active.parameters[*index] = value;
-                }
-            }
-            RigParameter::Controller(parameter) => {
-                if let Some(servo) = &mut self.servo {
-                    *match parameter {
-                        ControllerParameter::Gain => &mut servo.gain_duty_per_rad,
-                        ControllerParameter::DutyLimit => &mut servo.duty_limit,
-                        ControllerParameter::Delay => &mut servo.delay_s,
-                    } = value;
-                }
-            }
-        }
+        parameter.replace_in(&mut self.parameters, &mut self.effects, self.servo.as_mut(), value);
     }
 }
 
@@ -195,16 +156,12 @@ impl JointModel {
     /// When the recording lacks what drives the joint.
     pub fn from_rig(rig: &Rig, recording: &Recording) -> Result<Self, Failure> {
         let roles = rig.roles(recording)?;
-        let servo =
-            rig.controller.map(|Controller::Proportional { gain_duty_per_rad, duty_limit, delay_s }| {
-                ServoLaw { gain_duty_per_rad, duty_limit, delay_s }
-            });
         Ok(Self {
             parameters: rig.joint,
             effects: rig.effects.clone(),
             elements: rig.elements,
             step_s: rig.step_s,
-            servo,
+            servo: rig.controller,
             inputs: roles.inputs,
             outputs: roles.outputs,
             free_offsets: rig.free_offsets.clone(),

@@ -42,18 +42,16 @@ pub use roles::ReplayRoles;
 /// Value of `schema`.
 pub const SCHEMA: &str = "bowden-rig/1";
 
-/// Law of the position loop between reference and duty.
+/// Law of the position loop between reference and duty: `duty = clamp(gain · (theta_ref − theta), ±duty_limit)`, on the angle of
+/// `delay_s` ago.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Controller {
-    /// `duty = gain · (theta_ref − theta)`, limited to ±`duty_limit`, on the angle of `delay_s` ago.
-    Proportional {
-        /// Gain, duty per rad; positive.
-        gain_duty_per_rad: f64,
-        /// Largest duty, 0 to 1.
-        duty_limit: f64,
-        /// Delay between measurement and duty, s.
-        delay_s: f64,
-    },
+pub struct ProportionalLaw {
+    /// Gain, duty per rad; positive.
+    pub gain_duty_per_rad: f64,
+    /// Largest duty, 0 to 1.
+    pub duty_limit: f64,
+    /// Time between the measurement and the duty that follows from it, s.
+    pub delay_s: f64,
 }
 
 /// A bench as its user describes it.
@@ -66,7 +64,7 @@ pub struct Rig {
     /// Effects that the simulation contains beyond the nominal model.
     pub effects: Vec<ActiveEffect>,
     /// Law of the position loop, if it is known.
-    pub controller: Option<Controller>,
+    pub controller: Option<ProportionalLaw>,
     /// Slip elements of a tendon.
     pub elements: usize,
     /// Longest simulation step, s.

@@ -22,8 +22,6 @@ pub struct Study {
     pub benches: Vec<Bench>,
     /// Recordings to learn from, in the order of the file, followed by those that are held out.
     pub recordings: Vec<StudyRecording>,
-    /// Every file that was read.
-    pub files: Vec<PathBuf>,
 }
 
 /// A bench of a study.
@@ -33,8 +31,6 @@ pub struct Bench {
     pub name: String,
     /// What its user believes about it.
     pub rig: Rig,
-    /// Its rig file.
-    pub document: RigDocument,
     /// Parameters with a value of their own on this bench.
     pub own: Vec<RigParameter>,
 }
@@ -53,6 +49,35 @@ pub struct StudyRecording {
 }
 
 impl Study {
+    /// The study of one bench, with nothing different between its recordings.
+    #[must_use]
+    pub fn of_bench(rig: Rig, training: Vec<Recording>, heldout: Vec<Recording>) -> Self {
+        let listed =
+            |heldout| move |recording| StudyRecording { recording, bench: 0, heldout, set: Vec::new() };
+        let recordings =
+            training.into_iter().map(listed(false)).chain(heldout.into_iter().map(listed(true))).collect();
+        let name = rig.name.clone();
+        Self { name: name.clone(), benches: vec![Bench { name, rig, own: Vec::new() }], recordings }
+    }
+
+    /// The recordings that are held out, or those that are not.
+    pub fn recordings_where(&self, heldout: bool) -> impl Iterator<Item = &Recording> {
+        self.recordings.iter().filter(move |r| r.heldout == heldout).map(|r| &r.recording)
+    }
+}
+
+/// A study with the files that it was read from.
+#[derive(Clone, Debug)]
+pub struct LoadedStudy {
+    /// Benches and recordings.
+    pub study: Study,
+    /// Rig file of each bench.
+    pub documents: Vec<RigDocument>,
+    /// Every file that was read.
+    pub files: Vec<PathBuf>,
+}
+
+impl LoadedStudy {
     /// Whether a path names a study file and not a recording.
     #[must_use]
     pub fn is_named_by(path: &Path) -> bool {
@@ -69,6 +94,7 @@ impl Study {
         let file = StudyFile::load(path)?;
         let mut files = vec![path.to_owned()];
         let mut benches = Vec::with_capacity(file.benches.len());
+        let mut documents = Vec::with_capacity(file.benches.len());
         for bench in file.benches {
             let document = RigDocument::load(&bench.rig)?;
             let rig = document.rig()?;
@@ -82,7 +108,8 @@ impl Study {
             }
             files.push(bench.rig);
             let own = bench.own.into_iter().map(|(parameter, _)| parameter).collect();
-            benches.push(Bench { name: bench.name, rig, document, own });
+            benches.push(Bench { name: bench.name, rig, own });
+            documents.push(document);
         }
         let mut recordings = Vec::with_capacity(file.recordings.len());
         for listed in file.recordings {
@@ -100,39 +127,28 @@ impl Study {
             files.push(listed.path);
         }
         recordings.sort_by_key(|recording| recording.heldout);
-        Ok(Self { name: file.name, benches, recordings, files })
+        Ok(Self { study: Study { name: file.name, benches, recordings }, documents, files })
     }
 
-    /// The study of one bench, with nothing different between its recordings.
+    /// Reads the rig file and the recordings of one bench.
     ///
     /// # Errors
     /// What makes the rig file or a recording unusable; a recording that is given twice.
     pub fn of_one_bench(rig: &Path, training: &[PathBuf], heldout: &[PathBuf]) -> Result<Self, Failure> {
+        if let Some(twice) = heldout.iter().find(|path| training.iter().any(|other| is_same(other, path))) {
+            return Err(Failure::bad_input(format!(
+                "{}: given as training and as held out; a judge must be another recording",
+                twice.display()
+            )));
+        }
         let document = RigDocument::load(rig)?;
         let believed = document.rig()?;
-        let mut files = vec![rig.to_owned()];
-        let mut recordings = Vec::new();
-        for (path, heldout) in
-            training.iter().map(|path| (path, false)).chain(heldout.iter().map(|path| (path, true)))
-        {
-            if heldout && training.iter().any(|other| is_same(other, path)) {
-                return Err(Failure::bad_input(format!(
-                    "{}: given as training and as held out; a judge must be another recording",
-                    path.display()
-                )));
-            }
-            let recording = believed.load_recording(path)?;
-            recordings.push(StudyRecording { recording, bench: 0, heldout, set: Vec::new() });
-            files.push(path.clone());
-        }
-        let name = believed.name.clone();
-        let bench = Bench { name: name.clone(), rig: believed, document, own: Vec::new() };
-        Ok(Self { name, benches: vec![bench], recordings, files })
-    }
-
-    /// The recordings that are held out, or those that are not.
-    pub fn recordings_where(&self, heldout: bool) -> impl Iterator<Item = &Recording> {
-        self.recordings.iter().filter(move |r| r.heldout == heldout).map(|r| &r.recording)
+        let load = |paths: &[PathBuf]| -> Result<Vec<Recording>, Failure> {
+            paths.iter().map(|path| believed.load_recording(path)).collect()
+        };
+        let (learned, judging) = (load(training)?, load(heldout)?);
+        let files = [rig.to_owned()].into_iter().chain(training.iter().chain(heldout).cloned()).collect();
+        Ok(Self { study: Study::of_bench(believed, learned, judging), documents: vec![document], files })
     }
 }
 

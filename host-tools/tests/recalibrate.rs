@@ -13,6 +13,7 @@ use bowden::progress::Quiet;
 use bowden::recording::Recording;
 use bowden::rig::Rig;
 use bowden::simulate::{Motion, Reference, RunOptions, run};
+use bowden::study::Study;
 use bowden_model::channel::Channel::{BusVoltage, Duty, ThetaIn};
 use bowden_model::parameters::nominal;
 
@@ -74,7 +75,7 @@ fn a_fit_recovers_what_was_simulated() {
         nominal(section, name).unwrap().set(&mut truth.joint, value);
     }
     let recording = recorded(&truth, Motion::Lab, 20.0);
-    let result = recalibrate(&rig(), &[recording], &Quiet).unwrap();
+    let result = recalibrate(&Study::of_bench(rig(), vec![recording], Vec::new()), &Quiet).unwrap();
     for (section, name, value) in OFF {
         let found = result
             .parameters
@@ -114,7 +115,7 @@ fn products_are_known_and_their_factors_are_not() {
 #[test]
 fn a_joint_that_does_not_move_tells_nothing_on_friction() {
     let recording = recorded(&rig(), Motion::Rest, 5.0);
-    let result = recalibrate(&rig(), &[recording], &Quiet).unwrap();
+    let result = recalibrate(&Study::of_bench(rig(), vec![recording], Vec::new()), &Quiet).unwrap();
     for name in ["sheath.friction_coefficient", "motor.resistance_ohm", "load.viscous_nm_s_per_rad"] {
         assert!(result.unseen.iter().any(|unseen| unseen == name), "{name} not in {:?}", result.unseen);
     }

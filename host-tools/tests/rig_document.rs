@@ -1,7 +1,7 @@
 //! A rig file that is changed keeps its comments, and what is written reads back as the rig that was meant.
 
 use bowden::outcome::FailureClass;
-use bowden::rig::{Controller, Rig, RigDocument};
+use bowden::rig::{ProportionalLaw, Rig, RigDocument};
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Target};
 use bowden_model::effects::{CATALOGUE, find};
@@ -76,7 +76,7 @@ fn every_key_arrives_where_it_belongs() {
     assert_eq!(rig.name, "bench 3");
     assert_eq!(rig.joint.friction, FrictionLaw::Lumped);
     assert_eq!((rig.elements, rig.step_s), (24, 2.5e-4));
-    let expected = Controller::Proportional { gain_duty_per_rad: 8.0, duty_limit: 0.9, delay_s: 2e-3 };
+    let expected = ProportionalLaw { gain_duty_per_rad: 8.0, duty_limit: 0.9, delay_s: 2e-3 };
     assert_eq!(rig.controller, Some(expected));
     // Values in the order of the file, which is not the code's.
     let expected = [

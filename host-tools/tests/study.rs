@@ -4,12 +4,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use bowden::fit::recalibrate::recalibrate_study;
+use bowden::fit::recalibrate::recalibrate;
 use bowden::progress::Quiet;
 use bowden::recording::{ReadOptions, Recording};
 use bowden::rig::{Assignment, Rig};
 use bowden::simulate::{Motion, Reference, RunOptions, run};
-use bowden::study::Study;
+use bowden::study::LoadedStudy;
 
 /// What a bench really is, beside what its rig file states.
 struct Truth {
@@ -89,8 +89,8 @@ bench = "right"
 set = { "load.mass_kg" = 1.5 }
 "#;
     fs::write(folder.join("study.toml"), study).unwrap();
-    let loaded = Study::load(&folder.join("study.toml")).unwrap();
-    let result = recalibrate_study(&loaded, &Quiet).unwrap();
+    let loaded = LoadedStudy::load(&folder.join("study.toml")).unwrap();
+    let result = recalibrate(&loaded.study, &Quiet).unwrap();
     let fitted = |name: &str, bench: Option<usize>| {
         let found = result.parameters.iter().find(|p| p.parameter.to_string() == name && p.bench == bench);
         found.unwrap_or_else(|| panic!("{name} of bench {bench:?} was not fitted")).fitted
@@ -238,9 +238,9 @@ fn unusable_studies_are_refused_in_one_line() {
 #[test]
 fn the_servos_study_names_the_friction_of_its_gear() {
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/xl330-pendulum/study.toml");
-    let study = Study::load(&study).unwrap();
+    let study = LoadedStudy::load(&study).unwrap().study;
     assert_eq!((study.benches.len(), study.recordings.len()), (1, 11));
-    let diagnosis = bowden::diagnose::diagnose_study(&study, &[], &Quiet).unwrap().findings.diagnosis;
+    let diagnosis = bowden::diagnose::diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
     let named: Vec<&str> = diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
     assert_eq!(named, ["gear_load_friction"]);
     // 0.1583 and 0.1144 rad on the four recordings that took no part.

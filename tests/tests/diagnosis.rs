@@ -11,6 +11,7 @@ use bowden::progress::Quiet;
 use bowden::recording::Recording;
 use bowden::replay;
 use bowden::rig::{Rig, RigDocument};
+use bowden::study::Study;
 use bowden_model::channel::Channel;
 use bowden_model::effects::find;
 use bowden_model::parameters::{NOMINAL_PARAMETERS, UNITS_OF_STRENGTH};
@@ -50,7 +51,8 @@ impl Outcome {
         let second = case.heldout(MotionKind::LabHeldout, SECOND_SECONDS, seconds).unwrap();
         let second = recording_of(&second);
         let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
-        let diagnosed = diagnose(&rig, &[training], &[], asked, &Quiet).unwrap();
+        let diagnosed =
+            diagnose(&Study::of_bench(rig.clone(), vec![training], Vec::new()), asked, &Quiet).unwrap();
         let mut document = RigDocument::parse(&case.rig_toml(), "rig.toml").unwrap();
         diagnosed.write_into(0, &mut document).unwrap();
         let found = Rig::parse(&document.to_string(), "rig.diagnosed.toml").unwrap();
@@ -263,7 +265,10 @@ fn parameters_that_change_between_recordings_are_told_and_those_of_the_rig_kept(
     let training = recording_of(&changed.train(MotionKind::Lab, SECONDS).unwrap());
     let heldout = recording_of(&as_stated.heldout(MotionKind::LabHeldout, SECOND_SECONDS, SECONDS).unwrap());
     let rig = Rig::parse(&as_stated.rig_toml(), "rig.toml").unwrap();
-    let found = diagnose(&rig, &[training], &[heldout], &[], &Quiet).unwrap().findings.diagnosis;
+    let found = diagnose(&Study::of_bench(rig, vec![training], vec![heldout]), &[], &Quiet)
+        .unwrap()
+        .findings
+        .diagnosis;
     let unexplained = found.unexplained.unwrap();
     assert_eq!((found.verdict, &found.effects[..]), (Verdict::Unexplained, &[][..]));
     assert_eq!(
@@ -289,11 +294,12 @@ fn a_parameter_that_is_not_searched_is_not_reported() {
 fn the_number_of_threads_changes_nothing() {
     const SHORT_S: f64 = 8.0;
     let case = Case::new("case", vec![PretensionLoss { loss: 0.25, onset_s: 4.0 }.into()], 113, 3.0);
-    let training = [recording_of(&case.train(MotionKind::Lab, SHORT_S).unwrap())];
+    let training = recording_of(&case.train(MotionKind::Lab, SHORT_S).unwrap());
     let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
+    let study = Study::of_bench(rig, vec![training], Vec::new());
     let found = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| diagnose(&rig, &training, &[], &[], &Quiet).unwrap().findings)
+        pool.install(|| diagnose(&study, &[], &Quiet).unwrap().findings)
     };
     let alone = found(1);
     assert_eq!(alone.diagnosis.verdict, Verdict::MissingPhysics);
@@ -323,7 +329,8 @@ fn a_weaker_joint_is_diagnosed_as_the_strong_one_is() {
         }
     }
     let rig = Rig::parse(&finger(&case.rig_toml(), SHARE), "finger.toml").unwrap();
-    let found = diagnose(&rig, &[weak], &[], &[], &Quiet).unwrap().findings.diagnosis;
+    let found =
+        diagnose(&Study::of_bench(rig, vec![weak], Vec::new()), &[], &Quiet).unwrap().findings.diagnosis;
     println!("{}\n  {:?}", found.summary, found.effects);
     let [effect] = found.effects.as_slice() else { panic!("one effect expected: {:?}", found.effects) };
     assert_eq!(effect.id, "motor_coulomb_friction");

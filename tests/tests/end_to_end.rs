@@ -5,6 +5,7 @@ use bowden::progress::Quiet;
 use bowden::replay;
 use bowden::rig::Rig;
 use bowden::simulate::{Motion, Reference, RunOptions, run};
+use bowden::study::Study;
 use bowden_model::channel::Channel;
 use bowden_tests::{recording_of, rms_difference};
 use virtual_bench::{Case, MotionKind, Parameter, nominal_rig_toml};
@@ -53,7 +54,7 @@ fn a_fit_to_the_virtual_bench_recovers_its_parameters() {
         .off(Parameter::Mass, 1.06);
     let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
     let recording = recording_of(&case.train(MotionKind::Lab, 20.0).unwrap());
-    let result = recalibrate(&rig, &[recording], &Quiet).unwrap();
+    let result = recalibrate(&Study::of_bench(rig.clone(), vec![recording], Vec::new()), &Quiet).unwrap();
     let truth = case.truth_record();
     for (name, short, tolerance) in [
         ("sheath.friction_coefficient", "mu", 0.02),
@@ -84,7 +85,9 @@ fn a_seed_decides_every_bit() {
     assert_eq!(forward(4), forward(4));
     assert_ne!(forward(4), forward(5));
 
-    let fitted = || recalibrate(&rig, &[forward(4)], &Quiet).unwrap().parameters;
+    let fitted = || {
+        recalibrate(&Study::of_bench(rig.clone(), vec![forward(4)], Vec::new()), &Quiet).unwrap().parameters
+    };
     assert_eq!(fitted(), fitted());
 
     let bench = |seed| Case::new("case", Vec::new(), seed, 3.0).train(MotionKind::Multisine, 2.0).unwrap();

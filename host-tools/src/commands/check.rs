@@ -7,7 +7,7 @@ use super::{load_study, outcome_of, print};
 use crate::outcome::{Failure, Outcome};
 use crate::recording::{Column, ReadOptions, Recording};
 use crate::rig::Rig;
-use crate::study::Study;
+use crate::study::{LoadedStudy, Study};
 
 /// Arguments of `bowden check`.
 #[derive(Clone, Debug, clap::Args)]
@@ -27,9 +27,9 @@ impl CheckArguments {
     /// What makes a file unusable.
     pub fn run(&self) -> Result<Outcome, Failure> {
         if let [only] = &self.recordings[..]
-            && Study::is_named_by(only)
+            && LoadedStudy::is_named_by(only)
         {
-            let study = load_study(&self.recordings, self.rig.as_deref(), &[])?;
+            let LoadedStudy { study, .. } = load_study(&self.recordings, self.rig.as_deref(), &[])?;
             print(&describe_study(only, &study)?)?;
             return Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)));
         }

@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use bowden_model::effects::CATALOGUE;
 
 use super::{load_study, outcome_of, print};
-use crate::diagnose::{Diagnosed, diagnose_study};
+use crate::diagnose::{Diagnosed, diagnose};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::{Progress, UntilInterrupted};
 use crate::report;
 use crate::rig::RigDocument;
-use crate::study::Study;
+use crate::study::{LoadedStudy, Study};
 
 /// The result of a diagnosis, in its folder.
 pub const RESULT: &str = "diagnosis.json";
@@ -54,8 +54,8 @@ fn on_request() -> impl Iterator<Item = &'static str> {
 /// What a diagnosis works on, checked.
 #[derive(Clone, Debug)]
 pub struct DiagnoseTask {
-    /// Benches and recordings.
-    pub study: Study,
+    /// Benches and recordings, with their files.
+    pub loaded: LoadedStudy,
     /// Folder for the results.
     pub out: PathBuf,
 }
@@ -67,14 +67,14 @@ impl DiagnoseArguments {
     /// What makes an input unusable or the output impossible; a recording that is both training and held out.
     pub fn prepare(&self) -> Result<DiagnoseTask, Failure> {
         output::check_folder(&self.out)?;
-        let study = load_study(&self.recordings, self.rig.as_deref(), &self.heldout)?;
+        let loaded = load_study(&self.recordings, self.rig.as_deref(), &self.heldout)?;
         let earlier = earlier_experiments(&self.out);
-        let rigs = rig_files(&study);
+        let rigs = rig_files(&loaded.study);
         let files: Vec<&str> =
             [RESULT, REPORT].into_iter().chain(rigs.iter().chain(&earlier).map(String::as_str)).collect();
-        let inputs: Vec<&Path> = study.files.iter().map(PathBuf::as_path).collect();
+        let inputs: Vec<&Path> = loaded.files.iter().map(PathBuf::as_path).collect();
         output::prepare_folder(&self.out, &files, &inputs)?;
-        Ok(DiagnoseTask { study, out: self.out.clone() })
+        Ok(DiagnoseTask { loaded, out: self.out.clone() })
     }
 
     /// Diagnoses the recordings and writes result, report and rig.
@@ -83,16 +83,14 @@ impl DiagnoseArguments {
     /// What makes an input unusable, or the reason why no result can be written.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
         interrupt::catch()?;
-        let DiagnoseTask { mut study, out } = self.prepare()?;
+        let DiagnoseTask { loaded, out } = self.prepare()?;
+        let LoadedStudy { study, mut documents, .. } = loaded;
         let progress = &UntilInterrupted(progress);
         let also: Vec<&str> = self.also.iter().map(String::as_str).collect();
-        let diagnosed = diagnose_study(&study, &also, progress)?;
+        let diagnosed = diagnose(&study, &also, progress)?;
         let names = rig_files(&study);
-        let mut rigs: Vec<(&str, &mut RigDocument)> = names
-            .iter()
-            .zip(&mut study.benches)
-            .map(|(name, bench)| (name.as_str(), &mut bench.document))
-            .collect();
+        let mut rigs: Vec<(&str, &mut RigDocument)> =
+            names.iter().map(String::as_str).zip(&mut documents).collect();
         let page = save(&diagnosed, &mut rigs, &out)?;
         print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
         let mut outcome = outcome_of(study.recordings.iter().map(|listed| &listed.recording));

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::{all_paths, load_study, outcome_of, print};
 use crate::fit::objective::Series;
-use crate::fit::recalibrate::{FittedParameter, Recalibration, recalibrate_study};
+use crate::fit::recalibrate::{FittedParameter, Recalibration, recalibrate};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::Progress;
-use crate::study::Study;
+use crate::study::{LoadedStudy, Study};
 
 /// Arguments of `bowden fit`.
 #[derive(Clone, Debug, clap::Args)]
@@ -29,8 +29,8 @@ pub struct FitArguments {
 /// What a fit works on, checked.
 #[derive(Clone, Debug)]
 pub struct FitTask {
-    /// Benches and recordings.
-    pub study: Study,
+    /// Benches and recordings, with their files.
+    pub loaded: LoadedStudy,
     /// Where the fitted rigs go, one file a bench.
     pub out: Vec<PathBuf>,
 }
@@ -39,16 +39,16 @@ impl FitArguments {
     /// Fits, writes the fitted rigs and prints what changed and what stays unknown.
     ///
     /// # Errors
-    /// See [`FitArguments::prepare`] and [`recalibrate_study`].
+    /// See [`FitArguments::prepare`] and [`recalibrate`].
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
-        let mut task = self.prepare()?;
-        let result = recalibrate_study(&task.study, progress)?;
-        for (index, (bench, out)) in task.study.benches.iter_mut().zip(&task.out).enumerate() {
-            result.write_to(index, &mut bench.document)?;
-            bench.document.save(out)?;
+        let FitTask { loaded: LoadedStudy { study, mut documents, .. }, out } = self.prepare()?;
+        let result = recalibrate(&study, progress)?;
+        for (bench, (document, out)) in documents.iter_mut().zip(&out).enumerate() {
+            result.write_to(bench, document)?;
+            document.save(out)?;
         }
-        print(&table(&result, &task.study))?;
-        Ok(outcome_of(task.study.recordings.iter().map(|listed| &listed.recording)))
+        print(&table(&result, &study))?;
+        Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)))
     }
 
     /// Checks the output and reads the inputs.
@@ -62,19 +62,19 @@ impl FitArguments {
         if !of_a_study {
             output::check_file(&self.out, &inputs)?;
         }
-        let study = load_study(&self.recordings, self.rig.as_deref(), &[])?;
-        let out = if of_a_study { into_folder(&study, &self.out)? } else { vec![self.out.clone()] };
-        Ok(FitTask { study, out })
+        let loaded = load_study(&self.recordings, self.rig.as_deref(), &[])?;
+        let out = if of_a_study { into_folder(&loaded, &self.out)? } else { vec![self.out.clone()] };
+        Ok(FitTask { loaded, out })
     }
 }
 
 /// Files in a folder for the fitted rigs of a study; the folder is made if it is not there.
-fn into_folder(study: &Study, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let names: Vec<String> = match &study.benches[..] {
+fn into_folder(loaded: &LoadedStudy, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let names: Vec<String> = match &loaded.study.benches[..] {
         [_] => vec!["rig.fitted.toml".to_owned()],
         benches => benches.iter().map(|bench| format!("rig.fitted.{}.toml", bench.name)).collect(),
     };
-    let inputs: Vec<&Path> = study.files.iter().map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = loaded.files.iter().map(PathBuf::as_path).collect();
     output::prepare_folder(folder, &names.iter().map(String::as_str).collect::<Vec<_>>(), &inputs)?;
     Ok(names.iter().map(|name| folder.join(name)).collect())
 }

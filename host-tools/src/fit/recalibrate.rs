@@ -1,6 +1,6 @@
 //! Recalibration of a rig: its nominal parameters fitted to all samples of recordings, and what stays unknown.
 
-use super::free::{own_of_effect, recalibrated};
+use super::calibrated::{own_of_effect, recalibrated};
 use super::identifiability::{Group, Sensitivity};
 use super::objective::{Objective, Part, Series};
 use super::solver::solve;
@@ -8,8 +8,7 @@ use super::variation::Variation;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
-use crate::recording::Recording;
-use crate::rig::{Rig, RigDocument, RigParameter};
+use crate::rig::{RigDocument, RigParameter};
 use crate::study::Study;
 
 /// Evaluations that the optimiser may spend, times the number of parameters.
@@ -89,49 +88,23 @@ impl Recalibration {
     }
 }
 
-/// Fits the nominal parameters of `rig` to all samples of `recordings`.
+/// Fits the nominal parameters of the benches of a study to all samples of its recordings that are not held out; parameters that
+/// a bench has for itself are fitted to its recordings alone.
 ///
 /// Of parameters that only a product is known of, one is fitted and the others stay as they are. Effects that the rig
 /// names stay as they are too. Accuracy: on a recording of a forward run of the same model, friction, stiffness,
 /// pretension and mass come back within 3 % (test `a_fit_recovers_what_was_simulated`).
 ///
 /// # Errors
-/// When a recording lacks an input, or the joint cannot be simulated.
-pub fn recalibrate(
-    rig: &Rig,
-    recordings: &[Recording],
-    progress: &dyn Progress,
-) -> Result<Recalibration, Failure> {
-    let Some(first) = recordings.first() else {
-        return Err(Failure::bad_input("no recording to fit to; name one"));
-    };
-    let model = JointModel::from_rig(rig, first)?;
-    let objective = Objective::new(&model, recordings, &[], false)?;
-    let whole = Variation::new(model.clone(), 0, &model, Vec::new(), Vec::new());
-    recalibrated_joint(&objective, &model, &[whole], progress)
-}
-
-/// Fits the nominal parameters of the benches of a study to all samples of its recordings that are not held out; parameters that
-/// a bench has for itself are fitted to its recordings alone.
-///
-/// # Errors
-/// When a recording lacks an input, or a joint cannot be simulated.
-pub fn recalibrate_study(study: &Study, progress: &dyn Progress) -> Result<Recalibration, Failure> {
-    let model = study.joint()?;
-    let mut observed = study.observed(&model)?;
+/// When there is no recording to learn from, one lacks an input, or a joint cannot be simulated.
+pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibration, Failure> {
+    let model = &study.joint()?;
+    let mut observed = study.observed(model)?;
     observed.retain(|observed| observed.part == Part::Training);
-    let objective = Objective::of(&model, observed, false)?;
+    let objective = &Objective::of(model, observed, false)?;
     let benches: Result<Vec<Variation>, Failure> =
-        (0..study.benches.len()).map(|bench| study.variation_of_bench(bench, &model)).collect();
-    recalibrated_joint(&objective, &model, &benches?, progress)
-}
-
-fn recalibrated_joint(
-    objective: &Objective,
-    model: &JointModel,
-    benches: &[Variation],
-    progress: &dyn Progress,
-) -> Result<Recalibration, Failure> {
+        (0..study.benches.len()).map(|bench| study.variation_of_bench(bench, model)).collect();
+    let benches = benches?;
     let mut free = recalibrated(model);
     free.extend((0..model.effects.len()).flat_map(|effect| own_of_effect(model, effect)));
     progress.stage("recalibrating", 0);

@@ -12,8 +12,8 @@ use crate::diagnose::{Experiment, diagnose};
 use crate::link::course::Track;
 use crate::outcome::Failure;
 use crate::progress::Progress;
-use crate::recording::Recording;
-use crate::rig::{Rig, RigDocument};
+use crate::rig::Rig;
+use crate::study::LoadedStudy;
 
 /// Samples a second at which a track is looked at, Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -107,16 +107,13 @@ impl Case<'_> {
     /// # Errors
     /// As `bowden diagnose`; also if the user stopped it, with its files written.
     pub fn diagnose(&self, progress: &dyn Progress) -> Result<Diagnosed, Failure> {
-        let mut document = RigDocument::load(self.rig)?;
-        let rig = document.rig()?;
-        let load = |paths: &[PathBuf]| -> Result<Vec<Recording>, Failure> {
-            paths.iter().map(|path| rig.load_recording(path)).collect()
-        };
-        let (training, heldout) = (load(self.training)?, load(self.heldout)?);
-        let diagnosed = diagnose(&rig, &training, &heldout, &[], progress)?;
+        let LoadedStudy { study, mut documents, .. } =
+            LoadedStudy::of_one_bench(self.rig, self.training, self.heldout)?;
+        let document = &mut documents[0];
+        let diagnosed = diagnose(&study, &[], progress)?;
         let folder = self.folder.join(self.name);
         crate::output::prepare_folder(&folder, &[], &[])?;
-        save(&diagnosed, &mut [(RIG, &mut document)], &folder)?;
+        save(&diagnosed, &mut [(RIG, &mut *document)], &folder)?;
         let diagnosis = &diagnosed.findings.diagnosis;
         if !diagnosis.complete {
             return Err(Failure::failed("stopped by the user during the diagnosis"));
@@ -134,7 +131,7 @@ impl Case<'_> {
         Ok(Diagnosed {
             round,
             rig: document.rig()?,
-            notes: training.iter().chain(&heldout).flat_map(|r| r.notes().iter().cloned()).collect(),
+            notes: study.recordings.iter().flat_map(|r| r.recording.notes().iter().cloned()).collect(),
             experiments: diagnosed.experiments,
             findings: diagnosed.findings,
         })
@@ -180,6 +177,7 @@ mod tests {
     use bowden_model::channel::Channel;
 
     use super::*;
+    use crate::recording::Recording;
 
     #[test]
     fn experiments_beyond_the_limits_are_left_out_with_the_reason() {

@@ -8,6 +8,7 @@ use crate::diagnose::verdict::Diagnosis;
 use crate::outcome::Failure;
 use crate::progress::Quiet;
 use crate::recording::Recording;
+use crate::study::Study;
 
 /// A diagnosis that is to be made: what `bowden diagnose` is given.
 #[derive(Clone, Debug)]
@@ -42,7 +43,8 @@ impl Case<'_> {
             paths.map(|path: PathBuf| rig.load_recording(&path)).collect()
         };
         let (training, heldout) = (load(&self.training)?, load(&self.heldout)?);
-        Ok(diagnose(&rig, &training, &heldout, &[], &Quiet)?.findings.diagnosis)
+        let study = Study::of_bench(rig, training, heldout);
+        Ok(diagnose(&study, &[], &Quiet)?.findings.diagnosis)
     }
 
     /// Makes the diagnosis and writes command, verdict, named physics and held-out errors.

@@ -4,10 +4,10 @@ use std::fmt;
 
 use bowden_model::effect::{ActiveEffect, Descriptor};
 use bowden_model::effects::{CATALOGUE, find};
-use bowden_model::parameters::{NOMINAL_PARAMETERS, NominalParameter, nominal};
+use bowden_model::parameters::{JointParameters, NOMINAL_PARAMETERS, NominalParameter, nominal};
 
 use super::section::advice;
-use super::{Controller, Rig, parse};
+use super::{ProportionalLaw, Rig, parse};
 use crate::outcome::Failure;
 
 /// A number of a rig: `load.mass_kg`, `effects.joint_spring.rest_rad`, `controller.gain_duty_per_rad`.
@@ -45,6 +45,14 @@ impl ControllerParameter {
             Self::Gain => "gain_duty_per_rad",
             Self::DutyLimit => "duty_limit",
             Self::Delay => "delay_s",
+        }
+    }
+
+    const fn slot(self, law: &mut ProportionalLaw) -> &mut f64 {
+        match self {
+            Self::Gain => &mut law.gain_duty_per_rad,
+            Self::DutyLimit => &mut law.duty_limit,
+            Self::Delay => &mut law.delay_s,
         }
     }
 }
@@ -121,27 +129,61 @@ impl RigParameter {
         }
     }
 
+    /// Value in the parts of a joint; `None` where the part or the effect is not there. Of several instances of an effect the
+    /// first counts.
+    pub(crate) fn value_in(
+        &self,
+        joint: &JointParameters,
+        effects: &[ActiveEffect],
+        controller: Option<&ProportionalLaw>,
+    ) -> Option<f64> {
+        match self {
+            Self::Nominal(parameter) => parameter.get(joint),
+            Self::Effect { descriptor, index } => {
+                let instance = effects.iter().find(|active| active.descriptor().id == descriptor.id);
+                instance.map(|active| active.parameters[*index])
+            }
+            Self::Controller(parameter) => controller.map(|law| *parameter.slot(&mut law.clone())),
+        }
+    }
+
+    /// Replaces what [`Self::value_in`] finds; does nothing where it finds none.
+    pub(crate) fn replace_in(
+        &self,
+        joint: &mut JointParameters,
+        effects: &mut [ActiveEffect],
+        controller: Option<&mut ProportionalLaw>,
+        value: f64,
+    ) {
+        match self {
+            Self::Nominal(parameter) => parameter.set(joint, value),
+            Self::Effect { descriptor, index } => {
+                let is_meant = |active: &&mut ActiveEffect| active.descriptor().id == descriptor.id;
+                if let Some(active) = effects.iter_mut().find(is_meant) {
+                    active.parameters[*index] = value;
+                }
+            }
+            Self::Controller(parameter) => {
+                if let Some(law) = controller {
+                    *parameter.slot(law) = value;
+                }
+            }
+        }
+    }
+
     /// Value in a rig; `None` where the rig lacks the part, or has the effect not exactly once.
     #[must_use]
     pub fn get(&self, rig: &Rig) -> Option<f64> {
-        match self {
-            Self::Nominal(parameter) => parameter.get(&rig.joint),
-            Self::Effect { descriptor, index } => {
-                let mut instances =
-                    rig.effects.iter().filter(|active| active.descriptor().id == descriptor.id);
-                let only = instances.next().filter(|_| instances.next().is_none());
-                only.map(|active| active.parameters[*index])
+        let is_ambiguous = match self {
+            Self::Effect { descriptor, .. } => {
+                rig.effects.iter().filter(|active| active.descriptor().id == descriptor.id).count() > 1
             }
-            Self::Controller(parameter) => {
-                rig.controller.map(|Controller::Proportional { gain_duty_per_rad, duty_limit, delay_s }| {
-                    match parameter {
-                        ControllerParameter::Gain => gain_duty_per_rad,
-                        ControllerParameter::DutyLimit => duty_limit,
-                        ControllerParameter::Delay => delay_s,
-                    }
-                })
-            }
+            Self::Nominal(_) | Self::Controller(_) => false,
+        };
+        if is_ambiguous {
+            return None;
         }
+        self.value_in(&rig.joint, &rig.effects, rig.controller.as_ref())
     }
 
     /// Replaces the value in a rig.
@@ -169,26 +211,7 @@ impl RigParameter {
             };
             return Err(format!("{self}: the rig has {lacking}; {advice}, or leave the parameter out"));
         }
-        match self {
-            Self::Nominal(parameter) => parameter.set(&mut rig.joint, value),
-            Self::Effect { descriptor, index } => {
-                let is_meant = |active: &&mut ActiveEffect| active.descriptor().id == descriptor.id;
-                for active in rig.effects.iter_mut().filter(is_meant) {
-                    active.parameters[*index] = value;
-                }
-            }
-            Self::Controller(parameter) => {
-                if let Some(Controller::Proportional { gain_duty_per_rad, duty_limit, delay_s }) =
-                    &mut rig.controller
-                {
-                    *match parameter {
-                        ControllerParameter::Gain => gain_duty_per_rad,
-                        ControllerParameter::DutyLimit => duty_limit,
-                        ControllerParameter::Delay => delay_s,
-                    } = value;
-                }
-            }
-        }
+        self.replace_in(&mut rig.joint, &mut rig.effects, rig.controller.as_mut(), value);
         Ok(())
     }
 }
@@ -244,7 +267,16 @@ impl fmt::Debug for RigParameter {
 
 impl PartialEq for RigParameter {
     fn eq(&self, other: &Self) -> bool {
-        self.to_string() == other.to_string()
+        match (self, other) {
+            // Two nominal parameters of one place in the table are one.
+            (Self::Nominal(a), Self::Nominal(b)) => (a.section, a.spec.name) == (b.section, b.spec.name),
+            (
+                Self::Effect { descriptor: a, index: a_index },
+                Self::Effect { descriptor: b, index: b_index },
+            ) => (a.id, a_index) == (b.id, b_index),
+            (Self::Controller(a), Self::Controller(b)) => a == b,
+            _ => false,
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::roles::can_drive;
 use super::section::{Bounds, FINITE, Section, Source, advice};
-use super::{Controller, Rig, SCHEMA, effects};
+use super::{ProportionalLaw, Rig, SCHEMA, effects};
 use crate::outcome::Failure;
 use crate::recording::{ColumnMap, ColumnSource, TIME_ROLE};
 
@@ -240,7 +240,7 @@ fn read_simulation(section: Option<&Section>) -> Result<(usize, f64, FrictionLaw
     Ok((elements as usize, section.number("step_s", STEP_S)?.unwrap_or(DEFAULT_STEP_S), friction))
 }
 
-fn read_controller(section: &Section) -> Result<Controller, Failure> {
+fn read_controller(section: &Section) -> Result<ProportionalLaw, Failure> {
     section.refuse_unknown("key", ["kind", "gain_duty_per_rad", "duty_limit", "delay_s"])?;
     match section.string("kind")? {
         Some(("proportional", _)) => {}
@@ -252,7 +252,7 @@ fn read_controller(section: &Section) -> Result<Controller, Failure> {
     }
     let required =
         |key, bounds, meaning| section.number(key, bounds)?.ok_or_else(|| section.lacks(key, meaning));
-    Ok(Controller::Proportional {
+    Ok(ProportionalLaw {
         gain_duty_per_rad: required("gain_duty_per_rad", GAIN_DUTY_PER_RAD, "duty per rad of error")?,
         duty_limit: required("duty_limit", DUTY_LIMIT, "largest duty, such as 1")?,
         delay_s: section.number("delay_s", DELAY_S)?.unwrap_or(0.0),

@@ -16,7 +16,7 @@ use bowden_model::drive::{pulley_inertia_kg_m2, pulley_torque_constant_nm_per_a}
 use bowden_model::plant::{Plant, PlantConfig};
 
 use crate::outcome::Failure;
-use crate::rig::{Controller, Rig};
+use crate::rig::{ProportionalLaw, Rig};
 use crate::simulation::DelayLine;
 
 /// Bandwidth f of the loop unless the tendons are too soft for it, Hz.
@@ -50,7 +50,7 @@ impl PositionLoop {
     /// When the rig has no motor.
     pub fn new(rig: &Rig, config: &PlantConfig, start_rad: f64) -> Result<Self, Failure> {
         let law = match rig.controller {
-            Some(Controller::Proportional { gain_duty_per_rad, duty_limit, delay_s }) => {
+            Some(ProportionalLaw { gain_duty_per_rad, duty_limit, delay_s }) => {
                 Law::Proportional { gain_duty_per_rad, duty_limit, delay: DelayLine::new(delay_s, start_rad) }
             }
             None => Law::PiD(PiD::sized(config).ok_or_else(|| {

@@ -1,7 +1,7 @@
 //! The joint that the recordings of a study share, and what is different in each of them.
 
 use super::{Bench, Study, StudyRecording};
-use crate::fit::free::RECALIBRATED;
+use crate::fit::calibrated::{CALIBRATED, Calibrated};
 use crate::fit::objective::{Observed, Part};
 use crate::fit::variation::Variation;
 use crate::joint_model::{JointModel, OwnParameter, OwnParameters};
@@ -15,8 +15,11 @@ impl Study {
     /// bench by itself if `own` names it there or a recalibration moves it, and otherwise stays as stated.
     ///
     /// # Errors
-    /// When a recording lacks what drives the joint.
+    /// When there is no recording to learn from, or one lacks what drives the joint.
     pub fn joint(&self) -> Result<JointModel, Failure> {
+        if self.recordings_where(false).next().is_none() {
+            return Err(Failure::bad_input("no recording to learn from; name one that is not held out"));
+        }
         let mut joint = self.joint_of(0)?;
         let mut values = Vec::new();
         for (index, bench) in self.benches.iter().enumerate() {
@@ -95,7 +98,7 @@ impl Study {
     /// Parameters that a fit moves on this bench by itself.
     fn fitted_on(&self, bench: &Bench) -> Vec<RigParameter> {
         let mut fitted = bench.own.clone();
-        for (section, name) in RECALIBRATED {
+        for Calibrated { section, name, .. } in CALIBRATED {
             if let Ok(parameter) = RigParameter::parse(&format!("{section}.{name}"))
                 && self.is_stated_differently(&parameter)
                 && parameter.get(&bench.rig).is_some()
