@@ -7,7 +7,7 @@ use std::f64::consts::{PI, SQRT_2};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bowden::fit::free::recalibrated;
+use bowden::fit::calibrated::recalibrated;
 use bowden::fit::objective::{Objective, Part, Series};
 use bowden::fit::solver::solve;
 use bowden::joint_model::JointModel;

@@ -1,5 +1,6 @@
 //! Recalibration: nominal parameters fitted to recordings, with what the data can and cannot tell.
 
+pub mod calibrated;
 pub mod free;
 pub mod identifiability;
 pub mod objective;

@@ -96,6 +96,12 @@ impl Channel {
         Self::ALL.into_iter().find(|channel| channel.role() == role)
     }
 
+    /// Whether it is an angle, which an encoder counts.
+    #[must_use]
+    pub const fn is_angle(self) -> bool {
+        matches!(self, Self::ThetaRef | Self::ThetaMotor | Self::ThetaIn | Self::ThetaOut)
+    }
+
     /// SI unit, as it stands in reports.
     #[must_use]
     pub const fn unit(self) -> &'static str {

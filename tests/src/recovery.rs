@@ -1,6 +1,7 @@
 //! One concealed effect of the virtual bench, fitted by the same effect of bowden's model.
 
-use bowden::fit::free::{Free, recalibrated};
+use bowden::fit::calibrated::recalibrated;
+use bowden::fit::free::Free;
 use bowden::fit::objective::{Objective, Part};
 use bowden::fit::solver::solve;
 use bowden::joint_model::JointModel;

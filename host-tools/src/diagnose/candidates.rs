@@ -88,9 +88,11 @@ fn targets(model: &JointModel, descriptor: &Descriptor) -> Vec<Target> {
         return vec![Target::None];
     }
     let simulated = |channel: &Channel| {
-        // Zero and gain of an angle that drives the replay show in what follows from it.
-        let invertible = matches!(descriptor.id, "encoder_eccentricity" | "sensor_gain_error");
-        model.outputs.contains(channel) || (invertible && model.inputs.contains(channel))
+        // What an eccentric encoder makes of an angle that drives the replay shows in what follows from it.
+        let invertible = descriptor.id == "encoder_eccentricity";
+        // An encoder counts; where angles do not fit each other by a factor, that is the pulleys' ratio, which is recalibrated.
+        let cannot_be = descriptor.id == "sensor_gain_error" && channel.is_angle();
+        !cannot_be && (model.outputs.contains(channel) || (invertible && model.inputs.contains(channel)))
     };
     let mut targets: Vec<Target> =
         descriptor.channels.iter().filter(|c| simulated(c)).map(|c| Target::One(*c)).collect();
@@ -282,6 +284,16 @@ mod tests {
             .flat_map(|candidate| candidate.starts)
             .filter(|start| start.descriptor().id == id)
             .collect()
+    }
+
+    #[test]
+    fn an_encoder_that_counts_has_no_gain_to_be_wrong() {
+        let channels: Vec<Target> =
+            tried("sensor_gain_error", |model| model).iter().map(|start| start.target).collect();
+        assert!(channels.contains(&Target::One(Channel::F3)), "{channels:?}");
+        for angle in [Channel::ThetaIn, Channel::ThetaOut] {
+            assert!(!channels.contains(&Target::One(angle)), "{angle:?}");
+        }
     }
 
     #[test]

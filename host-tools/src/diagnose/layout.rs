@@ -10,7 +10,8 @@ use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 
-use crate::fit::free::{Free, own_of_effect, recalibrated, recalibrated_from};
+use crate::fit::calibrated::{own_of_effect, recalibrated, recalibrated_from};
+use crate::fit::free::Free;
 use crate::joint_model::JointModel;
 
 /// An effect that every bench has a little of, told by its first parameter.
@@ -275,8 +276,8 @@ mod tests {
         let (layout, with) = ordinary.with(&with, effect("joint_spring"));
         let (layout, with) = layout.with(&with, effect("presliding_compliance"));
         assert_eq!(ids(&with), ["motor_coulomb_friction", "joint_spring", "presliding_compliance"]);
-        // The contact's parameter stood behind the six nominal ones.
-        assert_eq!(ordinary.parameters_missing_in(&layout, &bench), [6]);
+        // The contact's parameter stood behind the seven nominal ones.
+        assert_eq!(ordinary.parameters_missing_in(&layout, &bench), [7]);
         let (back, without) = layout.without(&with, 1);
         assert_eq!(ids(&without), ["presliding_compliance", "motor_coulomb_friction", "joint_spring"]);
         assert_eq!(back, ordinary);
@@ -313,8 +314,8 @@ mod tests {
         moved.parameters.load.as_mut().unwrap().mass_kg *= 2.0;
         let free = Layout::of(&bench).free(&bench, &moved);
         let mass = free.iter().find(|free| free.path(&moved) == "load.mass_kg").unwrap();
-        // A standard deviation is a factor of e^0.5 either way.
-        assert!((mass.prior_residual(0.0) - 2.0_f64.ln() / 0.5).abs() < 1e-9, "{}", mass.prior_residual(0.0));
+        // A standard deviation is a factor of e^0.3 either way.
+        assert!((mass.prior_residual(0.0) - 2.0_f64.ln() / 0.3).abs() < 1e-9, "{}", mass.prior_residual(0.0));
         assert!(mass.prior_residual(-2.0_f64.ln()).abs() < 1e-9);
     }
 }

@@ -7,7 +7,8 @@
 //!
 //! Where a parameter has taken the place of what is missing, as a weight that of a spring, most of what the effect changes is
 //! what parameters change too; the little by which the two differ is lost in the curvature of so long a way. Such a start is
-//! simulated again with the parameters where the slopes would put them, and once more from there if that was better.
+//! simulated again with the parameters where the slopes would put them, and once more from there if that was better. Those that
+//! rank first start from such parameters wherever they predict better.
 
 use bowden_model::effect::{ActiveEffect, Component};
 use nalgebra::{DMatrix, DVector};
@@ -120,16 +121,19 @@ pub fn screen(
     let mut screened: Vec<Screened> = ranked
         .into_par_iter()
         .enumerate()
-        .map(|(place, judged)| match &judged.linear {
-            Some(linear) if place < VERIFIED && linear.gain > judged.start.gain => {
-                // Play and stick bend the way between two strengths; only a simulation tells.
-                let there = background.judge(linear.start);
-                there
-                    .map(|there| there.start)
-                    .filter(|there| there.gain > judged.start.gain)
-                    .unwrap_or(judged.start)
-            }
-            _ => judged.best().clone(),
+        .map(|(place, judged)| {
+            let best = match &judged.linear {
+                Some(linear) if place < VERIFIED && linear.gain > judged.start.gain => {
+                    // Play and stick bend the way between two strengths; only a simulation tells.
+                    let there = background.judge(linear.start);
+                    there
+                        .map(|there| there.start)
+                        .filter(|there| there.gain > judged.start.gain)
+                        .unwrap_or(judged.start)
+                }
+                _ => judged.best().clone(),
+            };
+            if place < VERIFIED && best.room.is_none() { background.with_room(best) } else { best }
         })
         .collect();
     screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -188,6 +192,23 @@ impl Background<'_> {
             }
         }
         Some(Judged { start: at_start, linear })
+    }
+
+    /// The same start with parameters where the slopes of the present model put them beside it, or half-way there, where that
+    /// predicts better than the present ones: stick and slip leave the optimiser no way there in small steps.
+    fn with_room(&self, start: Screened) -> Screened {
+        let Some(here) = self.residuals(start.start).filter(Residuals::is_finite) else { return start };
+        let here = rows(self.objective, &here);
+        let mut x = -self.basis.steps(&self.basis.inside(&here));
+        x.apply(|x| *x = x.clamp(-ROOM, ROOM));
+        let moved = [1.0, 0.5].into_iter().filter_map(|part| {
+            let room = self.with_parameters_at(&(&x * part));
+            let there = self.beside(&room, start.start).filter(Residuals::is_finite)?;
+            Some((rows(self.objective, &there).norm_squared(), room))
+        });
+        let best = moved.min_by(|(a, _), (b, _)| a.total_cmp(b));
+        let room = best.filter(|(loss, _)| *loss < here.norm_squared()).map(|(_, room)| room);
+        Screened { room, ..start }
     }
 
     /// The present model with its parameters at `x`, in the optimiser's coordinates.

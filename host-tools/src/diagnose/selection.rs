@@ -11,7 +11,7 @@ use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
 use super::screening::{Present, Screened, screen};
 use crate::fit::objective::{Objective, Part};
-use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_for_ranking, solve_in_rounds};
+use crate::fit::solver::{COARSE_STEP, FINE_STEP, Known, Solution, solve_for_ranking, solve_in_rounds};
 use crate::fit::typical::typical;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
@@ -20,6 +20,10 @@ use crate::progress::Progress;
 /// Share of the held-out loss that an effect must remove: what two realities differ by is not all ordinary contact and
 /// friction, and effects that imitate the rest remove a part of it.
 pub const WORTHWHILE_SHARE: f64 = 0.15;
+
+/// Loss, in squared scales, from which on more is left than noise and an ordinary bench leave: every residual beyond the three
+/// scales at which the loss bends.
+const MUCH_LEFT: f64 = 10.0;
 
 /// Loss, in squared scales, that an effect must remove whatever the share. On fifty virtual benches that hide nothing
 /// (`prove`, groups `nothing` and `parameters`) candidates remove up to 0.04, as `search` in their `diagnosis.json` tells, but
@@ -47,11 +51,15 @@ const FINALISTS: usize = 3;
 /// Held-out loss, over that of the best, beyond which a candidate is no finalist.
 const BEHIND: f64 = 2.5;
 
+/// Part of its estimated gain that a candidate's fit with the slopes of the present model has to reach; one that does not is fitted
+/// with slopes of its own.
+const KEPT_PROMISE: f64 = 0.5;
+
 /// Estimated gain below which a candidate is not fitted.
 const PROMISING: f64 = 0.08;
 
 /// Most effects that are named at once.
-const MOST_EFFECTS: usize = 3;
+const MOST_EFFECTS: usize = 6;
 
 /// Optimiser evaluations per parameter and round.
 const PATIENCE: usize = 5;
@@ -422,9 +430,19 @@ impl Search<'_> {
         let (layout, with) = present.layout.with(without, screened.start);
         let free = layout.free(self.believed, &with);
         let gone = present.layout.parameters_missing_in(&layout, self.believed);
-        let known = present.solution.jacobian.clone().remove_columns_at(&gone);
+        let slopes = present.solution.jacobian.clone().remove_columns_at(&gone);
+        let known = Known { jacobian: Some(&slopes), spread: present.solution.spread };
         let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
-        Ok(self.judged(layout, solution, false))
+        let training = |residuals| self.objective.mean_loss(residuals, Part::Training);
+        let promised = (1.0 - KEPT_PROMISE * screened.gain) * training(&present.solution.residuals);
+        if training(&solution.residuals) <= promised {
+            return Ok(self.judged(layout, solution, false));
+        }
+        // The slopes of the present model led astray: stick and slip bend the way.
+        let known = Known { jacobian: None, ..known };
+        let own = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
+        let better = if training(&own.residuals) < training(&solution.residuals) { own } else { solution };
+        Ok(self.judged(layout, better, false))
     }
 
     /// Fits the nominal parameters and those of all effects that the rig itself did not state.
@@ -441,9 +459,13 @@ impl Search<'_> {
 }
 
 /// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.
+///
+/// Where what is left stands far above what an ordinary bench leaves, other physics is missing too, and what takes a little off
+/// may only imitate it: every factor of ten beyond [`MUCH_LEFT`] asks for [`WORTHWHILE_SHARE`] more.
 #[must_use]
 pub fn worthwhile(before: f64, after: f64) -> bool {
-    before - after > WORTHWHILE_LOSS && before - after > WORTHWHILE_SHARE * before
+    let share = WORTHWHILE_SHARE * (1.0 + (after / MUCH_LEFT).log10().max(0.0));
+    before - after > WORTHWHILE_LOSS && before - after > share * before
 }
 
 /// Whether an effect was fitted so weak that it is hardly there, or no more than every bench has, or shows too little of itself
@@ -478,7 +500,7 @@ mod tests {
     use bowden_model::effects::find;
     use nalgebra::DMatrix;
 
-    use super::{Losses, Selected, largest_ordinary, negligible};
+    use super::{Losses, Selected, largest_ordinary, negligible, worthwhile};
     use crate::fit::objective::{Objective, Residuals};
     use crate::fit::solver::Solution;
     use crate::joint_model::JointModel;
@@ -497,6 +519,7 @@ mod tests {
                 values: Vec::new(),
                 stds: Vec::new(),
                 residuals: Residuals { values: Vec::new() },
+                spread: 1.0,
                 jacobian: DMatrix::zeros(0, 0),
             },
             plain: with(&[before]),
@@ -555,6 +578,16 @@ mod tests {
             [(friction(0.99), true), (friction(1.5), false), (cogging(11.0), true), (cogging(13.0), false)]
         {
             assert_eq!(negligible(&objective, &bench, &effect), left_out, "{:?}", effect.parameters);
+        }
+    }
+
+    /// A fifth of what is left is worth a name up to ten squared scales; of a hundred it takes three tenths.
+    #[test]
+    fn where_much_is_left_an_effect_has_to_take_more_off() {
+        for (before, after, named) in
+            [(10.0, 8.0, true), (12.5, 10.0, true), (125.0, 100.0, false), (145.0, 100.0, true)]
+        {
+            assert_eq!(worthwhile(before, after), named, "{before} to {after}");
         }
     }
 

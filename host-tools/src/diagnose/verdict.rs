@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::fit::calibrated::wrong_from;
+
 /// Value of `schema`.
 pub const SCHEMA: &str = "bowden-diagnosis/1";
 
@@ -88,12 +90,8 @@ pub struct Recalibrated {
     pub at_bound: bool,
 }
 
-/// Relative change from which on a parameter counts as wrong, where a data sheet or a balance tells it: motor and load. On
-/// virtual benches that are 3 % off their files and hide nothing, these come out up to 5 % off.
-pub(super) const WRONG_ON_PAPER: f64 = 0.1;
-
-/// The same for what changes from one mounting to the next: friction, stiffness, pretension. Of such benches, up to 12 %.
-pub(super) const WRONG_WHEN_MOUNTED: f64 = 0.15;
+/// Standard deviations by which a wrong parameter is off at least.
+const SURE: f64 = 3.0;
 
 impl Recalibrated {
     /// Name of the parameter, with the bench that has it for itself.
@@ -114,8 +112,8 @@ impl Recalibrated {
     /// Whether the rig file is wrong about it, and not just by what benches usually are.
     #[must_use]
     pub fn is_wrong(&self) -> bool {
-        let on_paper = ["motor.", "load."].iter().any(|section| self.parameter.starts_with(section));
-        self.change().abs() > if on_paper { WRONG_ON_PAPER } else { WRONG_WHEN_MOUNTED }
+        let is_sure = self.std.is_none_or(|std| (self.fitted - self.nominal).abs() > SURE * std);
+        is_sure && self.change().abs() > wrong_from(&self.parameter)
     }
 }
 
@@ -372,21 +370,26 @@ mod tests {
     use super::Recalibrated;
 
     #[test]
-    fn what_a_data_sheet_tells_is_wrong_earlier_than_what_a_mounting_changes() {
-        for (parameter, fitted, wrong) in [
-            ("motor.torque_constant_nm_per_a", 1.12, true),
-            ("motor.torque_constant_nm_per_a", 0.92, false),
-            ("load.mass_kg", 0.88, true),
-            ("sheath.friction_coefficient", 1.12, false),
-            ("sheath.friction_coefficient", 0.84, true),
-            ("tendon.pretension_n", 0.88, false),
+    fn what_a_caliper_or_a_data_sheet_tells_is_wrong_earlier_than_what_a_mounting_changes() {
+        for (parameter, fitted, std, wrong) in [
+            ("motor.torque_constant_nm_per_a", 1.12, None, true),
+            ("motor.torque_constant_nm_per_a", 0.92, None, false),
+            ("load.mass_kg", 0.88, None, true),
+            ("sheath.friction_coefficient", 1.12, None, false),
+            ("sheath.friction_coefficient", 0.84, None, true),
+            ("tendon.pretension_n", 0.88, None, false),
+            ("pulleys.output_radius_m", 0.96, Some(0.001), true),
+            ("pulleys.output_radius_m", 1.015, Some(0.001), false),
+            // Far off, but the recordings hardly tell.
+            ("motor.rotor_inertia_kg_m2", 2.0, Some(0.4), false),
+            ("motor.rotor_inertia_kg_m2", 2.0, Some(0.2), true),
         ] {
             let found = Recalibrated {
                 parameter: parameter.to_owned(),
                 bench: None,
                 nominal: 1.0,
                 fitted,
-                std: None,
+                std,
                 unit: "1".to_owned(),
                 at_bound: false,
             };

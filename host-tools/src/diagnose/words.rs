@@ -5,7 +5,8 @@ use std::fmt::Write;
 use bowden_model::effect::{ActiveEffect, Component};
 
 use super::selection::{Chosen, Tried};
-use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict, WRONG_ON_PAPER, WRONG_WHEN_MOUNTED};
+use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
+use crate::fit::calibrated::wrong_from;
 
 /// Sharpness with which a ratio of held-out losses turns into odds: a candidate that leaves a fifth more is six times
 /// less likely.
@@ -128,6 +129,21 @@ pub(super) fn short(value: f64) -> String {
     }
 }
 
+/// That no parameter is off, and how far the farthest is.
+fn as_stated(recalibrated: &[Recalibrated]) -> String {
+    let share = |p: &Recalibrated| p.change().abs() / wrong_from(&p.parameter);
+    recalibrated.iter().filter(|p| p.nominal != 0.0).max_by(|a, b| share(a).total_cmp(&share(b))).map_or_else(
+        || "The rig has no parameter to recalibrate.".to_owned(),
+        |p| {
+            format!(
+                "No parameter is farther from the rig file than is ordinary, {} ({:+.1} %) the farthest.",
+                p.name(),
+                100.0 * p.change()
+            )
+        },
+    )
+}
+
 /// The diagnosis in two sentences.
 pub(super) fn summary(
     verdict: Verdict,
@@ -142,11 +158,7 @@ pub(super) fn summary(
         .map(|p| format!("{} {:+.0} %", p.name(), 100.0 * p.change()))
         .collect();
     let parameters = if changed.is_empty() {
-        format!(
-            "Motor and load are within {:.0} % of the rig file, friction, stiffness and pretension within {:.0} %.",
-            100.0 * WRONG_ON_PAPER,
-            100.0 * WRONG_WHEN_MOUNTED
-        )
+        as_stated(recalibrated)
     } else {
         format!("Parameters that were off: {}.", changed.join(", "))
     };

@@ -3,6 +3,7 @@
 use bowden_model::effect::{ParameterSpec, Scale};
 use bowden_model::parameters::{NOMINAL_PARAMETERS, NominalParameter};
 
+use super::calibrated::spread;
 use super::typical::typical;
 use crate::joint_model::JointModel;
 use crate::rig::RigParameter;
@@ -25,7 +26,7 @@ pub enum Place {
 
 impl Place {
     /// Whether it is one of `parameters`.
-    fn is_any_of(&self, parameters: &[RigParameter]) -> bool {
+    pub(super) fn is_any_of(&self, parameters: &[RigParameter]) -> bool {
         match self {
             Self::Nominal(parameter) => parameters.contains(&RigParameter::Nominal(parameter)),
             Self::Effect { .. } | Self::Own(_) => false,
@@ -47,10 +48,6 @@ pub struct Free {
     prior: (f64, f64),
 }
 
-/// Standard deviation of what a user believes about a nominal parameter: a factor of 1.6 either way. Wide enough that
-/// data decide wherever they say anything, and a parameter that they do not touch stays where it was.
-const NOMINAL_PRIOR_STD: f64 = 0.5;
-
 impl Free {
     /// A nominal parameter of `model`; `None` when the model lacks the part.
     #[must_use]
@@ -61,7 +58,7 @@ impl Free {
         let mut spec = parameter.spec;
         spec.scale = if ratio { Scale::Log } else { Scale::Linear };
         let size = if ratio { 1.0 } else { spec.default.max(start) };
-        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior: (0.0, NOMINAL_PRIOR_STD) })
+        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior: (0.0, spread(parameter)) })
     }
 
     /// A parameter with a value of its own on one bench of `model`; `None` for one of an effect that the model lacks.
@@ -126,6 +123,12 @@ impl Free {
         };
         self.prior = (mean, spread);
         self
+    }
+
+    /// The same parameter, believed to be `value` as firmly as before.
+    #[must_use]
+    pub fn believed_to_be(self, value: f64) -> Self {
+        self.believed_within(value, self.prior.1)
     }
 
     /// The same parameter with a lower end of its range's upper end.
@@ -265,70 +268,4 @@ impl Free {
             }
         }
     }
-}
-
-/// Nominal parameters that a recalibration moves: one of each product that a replay cannot tell apart.
-///
-/// `μ` stands for `μ K`, `EA` for `EA / L`, the weight for `m l`; inertia of the rotor and gear ratio are counted and
-/// weighed when a bench is built.
-pub const RECALIBRATED: [(&str, &str); 6] = [
-    ("sheath", "friction_coefficient"),
-    ("tendon", "axial_stiffness_n"),
-    ("tendon", "pretension_n"),
-    ("motor", "resistance_ohm"),
-    ("motor", "torque_constant_nm_per_a"),
-    ("load", "mass_kg"),
-];
-
-/// Viscous friction, which a plain fit recalibrates too. A diagnosis does not: viscous friction beyond the stated one is
-/// an effect that it can name.
-pub const VISCOUS: [(&str, &str); 2] = [("motor", "viscous_nm_s_per_rad"), ("load", "viscous_nm_s_per_rad")];
-
-/// The parameters of [`RECALIBRATED`] that `model` has and shares, and the nominal parameters that single benches have for
-/// themselves.
-#[must_use]
-pub fn recalibrated(model: &JointModel) -> Vec<Free> {
-    let of_benches = (0..model.own.values.len())
-        .filter(|index| !model.own.values[*index].parameter.is_of_effect())
-        .filter_map(|index| Free::own(model, index));
-    shared(model, &RECALIBRATED).chain(of_benches).collect()
-}
-
-/// The parameters of `names` that `model` has and that not every bench has for itself.
-fn shared<'m>(model: &'m JointModel, names: &'m [(&str, &str)]) -> impl Iterator<Item = Free> + 'm {
-    names
-        .iter()
-        .filter_map(|(section, name)| Free::nominal(model, section, name))
-        .filter(|free| !free.place().is_any_of(&model.own.everywhere))
-}
-
-/// The same as [`recalibrated`], with what `believed` states as the prior, wherever `model` has got to.
-#[must_use]
-pub fn recalibrated_from(believed: &JointModel, model: &JointModel) -> Vec<Free> {
-    recalibrated(model)
-        .into_iter()
-        .zip(recalibrated(believed))
-        .map(|(free, before)| free.believed_within(before.start, NOMINAL_PRIOR_STD))
-        .collect()
-}
-
-/// Parameters of effect `effect` of `model` that single benches have for themselves.
-#[must_use]
-pub fn own_of_effect(model: &JointModel, effect: usize) -> Vec<Free> {
-    let Some(id) = model.effects.get(effect).map(|active| active.descriptor().id) else { return Vec::new() };
-    let belongs = |index: &usize| match model.own.values[*index].parameter {
-        RigParameter::Effect { descriptor, .. } => descriptor.id == id,
-        _ => false,
-    };
-    (0..model.own.values.len()).filter(belongs).filter_map(|index| Free::own(model, index)).collect()
-}
-
-/// The parameters of [`RECALIBRATED`] and [`VISCOUS`] that `model` has.
-#[must_use]
-pub fn recalibrated_with_viscous(model: &JointModel) -> Vec<Free> {
-    RECALIBRATED
-        .iter()
-        .chain(&VISCOUS)
-        .filter_map(|(section, name)| Free::nominal(model, section, name))
-        .collect()
 }

@@ -10,7 +10,7 @@ use std::fmt;
 use bowden_model::parameters::{NOMINAL_PARAMETERS, NominalParameter};
 use rayon::prelude::*;
 
-use super::free::RECALIBRATED;
+use super::calibrated::calibrated;
 use super::objective::{Objective, Part, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
@@ -139,7 +139,7 @@ fn path(parameter: &NominalParameter) -> String {
 }
 
 fn is_recalibrated(name: &str) -> bool {
-    RECALIBRATED.iter().any(|(section, key)| name.split_once('.') == Some((section, key)))
+    name.split_once('.').is_some_and(|(section, key)| calibrated(section, key).is_some())
 }
 
 /// Values below and above the present one, and their distance in units of the relative change.

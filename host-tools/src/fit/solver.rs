@@ -28,6 +28,8 @@ pub struct Solution {
     pub stds: Vec<Option<f64>>,
     /// Residuals of the fitted model.
     pub residuals: Residuals,
+    /// Standard deviation of a weighted residual of the fitted model, at least 1: the weight of what is believed.
+    pub spread: f64,
     /// Slopes of the weighted residuals over the optimiser's coordinates, training rows and priors; empty after a fit that
     /// only ranks.
     pub jacobian: DMatrix<f64>,
@@ -37,15 +39,39 @@ struct Problem<'a> {
     objective: &'a Objective,
     model: &'a JointModel,
     free: &'a [Free],
-    fixed: &'a [bool],
+    fixed: Vec<bool>,
     step: f64,
+    /// Factor of the priors: what a weighted residual is spread by. Where the model misses the data by twenty scales, a change
+    /// that takes a scale off proves nothing against what is believed.
+    prior_weight: f64,
     /// Slopes over the first parameters that are taken as known.
     known: Option<&'a DMatrix<f64>>,
     x: DVector<f64>,
     current: Option<Residuals>,
+    /// Slopes at the place where the round begins.
+    begun: Option<(DVector<f64>, DMatrix<f64>)>,
 }
 
 impl Problem<'_> {
+    /// Weighs the priors by what the parameters cannot take off here: how far a fit still has to go says nothing of what will be left.
+    fn weigh_priors(&mut self) {
+        let (Some(slopes), Some(current)) = (self.slopes(), &self.current) else { return };
+        let rows = DVector::from_vec(training_rows(self.objective, current));
+        let data = slopes.rows(0, rows.len()).into_owned();
+        let left = left_over(&data, rows);
+        self.prior_weight = spread(self.objective, left.as_slice(), self.free.len());
+        self.begun = Some((self.x.clone(), slopes));
+    }
+
+    /// `slopes` with the rows of the priors as they are weighed now.
+    fn with_priors(&self, mut slopes: DMatrix<f64>) -> DMatrix<f64> {
+        let first = slopes.nrows() - self.free.len();
+        for (j, free) in self.free.iter().enumerate().filter(|(j, _)| !self.fixed[*j]) {
+            slopes[(first + j, j)] = self.prior_weight * free.prior_slope();
+        }
+        slopes
+    }
+
     fn model_at(&self, x: &DVector<f64>) -> JointModel {
         let mut model = self.model.clone();
         for (free, x) in self.free.iter().zip(x.iter()) {
@@ -62,25 +88,25 @@ impl Problem<'_> {
     fn known_column(&self, known: &DMatrix<f64>, j: usize, rows: usize) -> DVector<f64> {
         let data = rows - self.free.len();
         let mut column = known.column(j).rows(0, data).into_owned().resize_vertically(rows, 0.0);
-        column[data + j] = self.free[j].prior_slope();
+        column[data + j] = self.prior_weight * self.free[j].prior_slope();
         column
-    }
-
-    /// Standard deviation of a weighted residual, allowing for how long residuals stay alike.
-    fn spread(&self) -> f64 {
-        let rows = self.residuals().unwrap_or_else(|| DVector::zeros(0));
-        let freedom = rows.len() as f64 / CORRELATED_BLOCKS - self.free.len() as f64;
-        let variance = (rows.norm_squared() / freedom.max(1.0)).max(1e-300);
-        let alike = self.current.as_ref().map_or(1.0, |residuals| blocks_alike(self.objective, residuals));
-        (variance * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt()
     }
 
     /// Weighted training residuals followed by the priors.
     fn weighted(&self, residuals: &Residuals, x: &DVector<f64>) -> DVector<f64> {
         let mut rows = training_rows(self.objective, residuals);
-        rows.extend(self.free.iter().zip(x.iter()).map(|(free, x)| free.prior_residual(*x)));
+        let priors = self.free.iter().zip(x.iter());
+        rows.extend(priors.map(|(free, x)| self.prior_weight * free.prior_residual(*x)));
         DVector::from_vec(rows)
     }
+}
+
+/// Standard deviation of weighted training residuals, allowing for how long they stay alike; at least 1, what scales say.
+fn spread(objective: &Objective, rows: &[f64], parameters: usize) -> f64 {
+    let freedom = rows.len() as f64 / CORRELATED_BLOCKS - parameters as f64;
+    let variance = rows.iter().map(|row| row * row).sum::<f64>() / freedom.max(1.0);
+    let alike = blocks_alike(objective, rows);
+    (variance * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt().max(1.0)
 }
 
 /// Training residuals after the soft loss, weighted as in a fit. Neighbouring blocks tell nearly the same: their weight is that of one block
@@ -117,6 +143,16 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
+        match &self.begun {
+            Some((x, slopes)) if *x == self.x => Some(self.with_priors(slopes.clone())),
+            _ => self.slopes(),
+        }
+    }
+}
+
+impl Problem<'_> {
+    /// Slopes of the weighted residuals.
+    fn slopes(&self) -> Option<DMatrix<f64>> {
         let here = self.weighted(self.current.as_ref()?, &self.x);
         let columns: Option<Vec<DVector<f64>>> = (0..self.free.len())
             .into_par_iter()
@@ -177,9 +213,16 @@ pub fn solve_in_rounds(
     solve_knowing(objective, model, free, patience, rounds, None)
 }
 
-/// Like [`solve_in_rounds`] in one coarse round, but the slopes over the first parameters are taken from `known`, those of a fit
-/// of the same model without the last parameters: a third of the simulations, for candidates that are only to be ranked.
-/// The solution has neither slopes nor standard deviations.
+/// What a fit of the same model without its last parameters knows.
+pub struct Known<'a> {
+    /// Slopes over the first parameters; without them every slope is found anew.
+    pub jacobian: Option<&'a DMatrix<f64>>,
+    /// What a weighted residual was spread by.
+    pub spread: f64,
+}
+
+/// Like [`solve_in_rounds`] in one coarse round, beside what `known` tells: with its slopes it takes a third of the simulations, for
+/// candidates that are only to be ranked, and the solution then has neither slopes nor standard deviations.
 ///
 /// # Errors
 /// When the model cannot be driven.
@@ -188,7 +231,7 @@ pub fn solve_for_ranking(
     model: &JointModel,
     free: &[Free],
     patience: usize,
-    known: &DMatrix<f64>,
+    known: &Known,
 ) -> Result<Solution, Failure> {
     solve_knowing(objective, model, free, patience, &[COARSE_STEP], Some(known))
 }
@@ -199,8 +242,9 @@ fn solve_knowing(
     free: &[Free],
     patience: usize,
     rounds: &[f64],
-    known: Option<&DMatrix<f64>>,
+    known: Option<&Known>,
 ) -> Result<Solution, Failure> {
+    let slopes = known.and_then(|known| known.jacobian);
     let [objective, judging] = &objective.split();
     // Inside the optimiser an error could not be told.
     let mut start = objective.residuals(model)?;
@@ -211,15 +255,32 @@ fn solve_knowing(
             values: Vec::new(),
             stds: Vec::new(),
             residuals: start,
+            spread: 1.0,
             jacobian: DMatrix::zeros(0, 0),
         });
     }
     let mut fixed = vec![false; free.len()];
+    let prior_weight = known.map_or(1.0, |known| known.spread);
+    let problem_at = |step, fixed: &[bool], x, current| Problem {
+        objective,
+        model,
+        free,
+        fixed: fixed.to_vec(),
+        step,
+        prior_weight,
+        known: slopes,
+        x,
+        current,
+        begun: None,
+    };
     let mut x = DVector::zeros(free.len());
     // Residuals at `x`: no round simulates again where the one before it ended.
     let mut current = Some(start).filter(Residuals::is_finite);
     for (round, &step) in rounds.iter().enumerate() {
-        let problem = Problem { objective, model, free, fixed: &fixed, step, known, x, current };
+        let mut problem = problem_at(step, &fixed, x, current);
+        if known.is_none() {
+            problem.weigh_priors();
+        }
         // Farther than this the difference quotients do not lead.
         let tolerance = if step >= COARSE_STEP { 3e-3 } else { 5e-4 };
         let optimiser = LevenbergMarquardt::new()
@@ -242,18 +303,18 @@ fn solve_knowing(
             break;
         }
     }
-    let problem = Problem { objective, model, free, fixed: &fixed, step: FINE_STEP, known, x, current };
+    let mut problem = problem_at(FINE_STEP, &fixed, x, current);
     let values: Vec<f64> = free.iter().zip(problem.x.iter()).map(|(free, x)| free.value_at(*x)).collect();
     let model = problem.model_at(&problem.x);
-    let (jacobian, stds) = if known.is_some() {
+    let (jacobian, stds) = if slopes.is_some() {
         (DMatrix::zeros(0, 0), vec![None; free.len()])
     } else {
+        problem.weigh_priors();
         let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
-        let spread = problem.spread();
         let stds = standard_deviations(&jacobian, &fixed)
             .into_iter()
             .zip(free.iter().zip(&values))
-            .map(|(std, (free, value))| std.map(|s| s * spread * free.slope_at(*value)))
+            .map(|(std, (free, value))| std.map(|s| s * problem.prior_weight * free.slope_at(*value)))
             .collect();
         (jacobian, stds)
     };
@@ -262,12 +323,12 @@ fn solve_knowing(
         None => objective.residuals(&model)?,
     };
     residuals.values.extend(judging.residuals(&model)?.values);
-    Ok(Solution { model, values, stds, residuals, jacobian })
+    Ok(Solution { model, values, stds, residuals, spread: problem.prior_weight, jacobian })
 }
 
 /// Over how many blocks the residuals of the fitted model stay alike, on average: what is left is mostly the difference
 /// between two descriptions of the same contact, which lasts as long as a motion does, and tells so much less.
-fn blocks_alike(objective: &Objective, residuals: &Residuals) -> f64 {
+fn blocks_alike(objective: &Objective, rows: &[f64]) -> f64 {
     let (mut weighted, mut weight) = (0.0, 0.0);
     let mut run: Vec<f64> = Vec::new();
     let mut before: Option<Entry> = None;
@@ -280,15 +341,16 @@ fn blocks_alike(objective: &Objective, residuals: &Residuals) -> f64 {
         }
         run.clear();
     };
-    for (entry, value) in objective.entries().zip(&residuals.values) {
+    let trained = objective.entries().filter(|entry| entry.block.part == Part::Training);
+    for (entry, value) in trained.zip(rows) {
         let follows = before.is_some_and(|before| {
             (before.series, before.recording, before.aspect) == (entry.series, entry.recording, entry.aspect)
         });
         if !follows {
             close(&mut run);
         }
-        if entry.aspect == Aspect::Mean && entry.block.part == Part::Training {
-            run.push(soft(*value));
+        if entry.aspect == Aspect::Mean {
+            run.push(*value);
         }
         before = Some(entry);
     }
@@ -314,6 +376,20 @@ fn autocorrelation_time(values: &[f64]) -> f64 {
     time.max(1.0)
 }
 
+/// What is left of `rows` when the columns have taken off what they can.
+fn left_over(columns: &DMatrix<f64>, rows: DVector<f64>) -> DVector<f64> {
+    let seen: Vec<_> = (0..columns.ncols())
+        .filter(|j| columns.column(*j).norm_squared() > 0.0)
+        .map(|j| columns.column(j).into_owned())
+        .collect();
+    if seen.is_empty() || rows.is_empty() {
+        return rows;
+    }
+    let basis = DMatrix::from_columns(&seen).qr().q();
+    let inside = basis.tr_mul(&rows);
+    rows - basis * inside
+}
+
 /// Square roots of the diagonal of `(JᵀJ)⁻¹`.
 fn standard_deviations(jacobian: &DMatrix<f64>, fixed: &[bool]) -> Vec<Option<f64>> {
     // A parameter without any slope has no spread to tell and would make the others' unsolvable.
@@ -336,10 +412,64 @@ fn standard_deviations(jacobian: &DMatrix<f64>, fixed: &[bool]) -> Vec<Option<f6
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;
 
-    use super::autocorrelation_time;
+    use super::{COARSE_STEP, FINE_STEP, autocorrelation_time, solve_in_rounds, spread, training_rows};
+    use crate::fit::free::Free;
+    use crate::fit::objective::{Objective, Residuals};
+    use crate::joint_model::JointModel;
+    use crate::recording::Recording;
+    use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
+
+    /// Independent residuals of so many scales are spread by as much, but by no less than one.
+    #[test]
+    fn beliefs_weigh_as_much_as_the_residuals_are_spread() {
+        let model = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(8000)).unwrap();
+        let objective = Objective::new(&model, &[test_bench::swung(8000)], &[], true).unwrap();
+        let of_scales = |scales: f64| {
+            let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let values = (0..objective.entries().count()).map(|k| scales * sign(k)).collect();
+            training_rows(&objective, &Residuals { values })
+        };
+        assert_eq!(spread(&objective, &of_scales(0.1), 0), 1.0);
+        // The bent loss of 2 is 9 * 2 (sqrt(1 + 4/9) - 1) = 3.633.
+        assert!((spread(&objective, &of_scales(2.0), 0) / 3.633_f64.sqrt() - 1.0).abs() < 1e-3);
+    }
+
+    /// Only the joint's angle is recorded, and it follows another law than the model's: the pretension, which it hardly answers to,
+    /// stays near the rig file. Recorded tensions of the same bench move it all the way.
+    #[test]
+    fn what_the_recordings_do_not_touch_stays_where_the_rig_file_has_it() {
+        let mut recording = test_bench::swung(8000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let mut real = model.clone();
+        real.parameters.tendon.as_mut().unwrap().pretension_n *= 1.3;
+        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+        let bent =
+            recording.channel(Channel::ThetaOut).unwrap().iter().map(|theta| theta + 0.3 * theta * theta);
+        let bent: Vec<f64> = bent.collect();
+        let found = |channels: &[Channel]| {
+            let mut seen = Recording::new("seen", recording.t_s().to_vec());
+            for channel in [Channel::ThetaIn].iter().chain(channels) {
+                seen.set(*channel, recording.channel(*channel).unwrap().to_vec());
+            }
+            if channels == [Channel::ThetaOut] {
+                seen.set(Channel::ThetaOut, bent.clone());
+            }
+            let free = [Free::nominal(&model, "tendon", "pretension_n").unwrap()];
+            let objective = Objective::new(&model, &[seen], &[], true).unwrap();
+            solve_in_rounds(&objective, &model, &free, 5, &[COARSE_STEP, FINE_STEP]).unwrap().values[0] / 30.0
+        };
+        let (angle_alone, tensions) = (found(&[Channel::ThetaOut]), found(&Channel::TENSIONS));
+        assert!((angle_alone - 1.0).abs() < 0.05, "{angle_alone}");
+        assert!((tensions - 1.3).abs() < 0.02, "{tensions}");
+    }
 
     /// A first-order process of pole `p` stays alike for `(1 + p)/(1 - p)` samples.
     #[test]
