@@ -8,6 +8,7 @@ pub mod lengths;
 pub mod outcome;
 pub mod page;
 pub mod plan;
+pub mod recorded;
 pub mod rivals;
 pub mod run;
 pub mod score;

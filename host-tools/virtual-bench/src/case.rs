@@ -24,17 +24,23 @@ pub enum Parameter {
     TorqueConstant,
     /// `m`: mass of the load.
     Mass,
+    /// `r2`: radius of the output pulley.
+    OutputRadius,
+    /// `l`: length of the arm.
+    Arm,
 }
 
 impl Parameter {
     /// All of them with their short names.
-    pub const NAMES: [(&'static str, Self); 6] = [
+    pub const NAMES: [(&'static str, Self); 8] = [
         ("mu", Self::FrictionCoefficient),
         ("ea", Self::AxialStiffness),
         ("f0", Self::Pretension),
         ("res", Self::Resistance),
         ("kt", Self::TorqueConstant),
         ("m", Self::Mass),
+        ("r2", Self::OutputRadius),
+        ("l", Self::Arm),
     ];
 
     fn short_name(self) -> &'static str {
@@ -45,6 +51,8 @@ impl Parameter {
             Self::Resistance => "res",
             Self::TorqueConstant => "kt",
             Self::Mass => "m",
+            Self::OutputRadius => "r2",
+            Self::Arm => "l",
         }
     }
 
@@ -56,6 +64,8 @@ impl Parameter {
             Self::Resistance => &mut config.resistance_ohm,
             Self::TorqueConstant => &mut config.torque_constant_nm_per_a,
             Self::Mass => &mut config.mass_kg,
+            Self::OutputRadius => &mut config.output_radius_m,
+            Self::Arm => &mut config.arm_m,
         }
     }
 }

@@ -80,31 +80,35 @@ impl Recording {
         self.columns().into_iter().find(|(known, _)| *known == name).map(|(_, values)| values)
     }
 
-    /// Writes a header line and one line a sample, comma separated.
+    /// Writes a header line and one line a sample, comma separated. A column without values is left out.
     ///
     /// # Errors
     /// Those of `out`.
     pub fn write_csv(&self, mut out: impl Write) -> io::Result<()> {
         let columns = self.columns();
-        let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
+        let kept: Vec<(&str, &[f64], usize)> = columns
+            .into_iter()
+            .filter(|(name, values)| *name == "t_s" || !values.is_empty())
+            .map(|(name, values)| (name, values, decimals(name)))
+            .collect();
+        let names: Vec<&str> = kept.iter().map(|(name, ..)| *name).collect();
         writeln!(out, "{}", names.join(","))?;
         for row in 0..self.len() {
-            writeln!(
-                out,
-                "{:.6},{:.6},{:.6},{:.6},{:.4},{:.4},{:.4},{:.4},{:.4},{:.2},{:.4}",
-                self.t_s[row],
-                self.theta_ref_rad[row],
-                self.theta_in_rad[row],
-                self.theta_out_rad[row],
-                self.f1_n[row],
-                self.f2_n[row],
-                self.f3_n[row],
-                self.f4_n[row],
-                self.duty[row],
-                self.bus_v[row],
-                self.i_motor_a[row],
-            )?;
+            for (place, (_, values, decimals)) in kept.iter().enumerate() {
+                let comma = if place == 0 { "" } else { "," };
+                write!(out, "{comma}{:.decimals$}", values[row])?;
+            }
+            writeln!(out)?;
         }
         out.flush()
+    }
+}
+
+/// Decimals of a column in a file.
+fn decimals(name: &str) -> usize {
+    match name {
+        "bus_v" => 2,
+        _ if name.ends_with("_rad") || name == "t_s" => 6,
+        _ => 4,
     }
 }

@@ -5,7 +5,10 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
+
 use virtual_bench::{BenchConfig, BenchError, Case, Component, ConcealedEffect, Parameter};
+
+use super::recorded::Recorded;
 
 /// Standard deviation, in per cent, by which stiffness and pretension of every bench are off its rig file.
 const PERTURBED_PERCENT: f64 = 3.0;
@@ -26,6 +29,17 @@ const TRIPLES: usize = 10;
 const NOTHING: usize = 25;
 const PARAMETERS: usize = 25;
 
+/// Number of rigs with four or five effects, with wrong geometry, and without tensions.
+const MANY: usize = 20;
+const GEOMETRY: usize = 20;
+const NO_TENSIONS: usize = 20;
+
+/// Number of rigs with tensions at the motor alone, of dirty files and of slow ones.
+const OTHERWISE_RECORDED: usize = 12;
+
+/// One case in so many of those that are recorded otherwise hides nothing.
+const HIDING_NOTHING: usize = 4;
+
 /// Physics that a rig file of lumped friction leaves out; every bench has it.
 pub const DISTRIBUTED_FRICTION: &str = "distributed_friction";
 
@@ -45,12 +59,48 @@ pub enum Group {
     Parameters,
     /// Physics that the catalogue has no name for.
     Outside,
+    /// Four or five effects at once, at most two of a component.
+    Many,
+    /// Output radius and arm are wrong in the rig file; every other case conceals an effect as well.
+    Geometry,
+    /// Encoders and motor were recorded, no tension; one effect in three cases of four.
+    NoTensions,
+    /// Of the tensions those at the motor were recorded; one effect in three cases of four.
+    MotorSide,
+    /// Spikes, lost rows, a clock that jitters; one effect in three cases of four.
+    Dirty,
+    /// Recorded at 100 Hz; one effect in three cases of four.
+    Slow,
 }
 
 impl Group {
     /// All groups in the order of the run.
-    pub const ALL: [Self; 6] =
-        [Self::Single, Self::Pair, Self::Triple, Self::Nothing, Self::Parameters, Self::Outside];
+    pub const ALL: [Self; 12] = [
+        Self::Single,
+        Self::Pair,
+        Self::Triple,
+        Self::Nothing,
+        Self::Parameters,
+        Self::Outside,
+        Self::Many,
+        Self::Geometry,
+        Self::NoTensions,
+        Self::MotorSide,
+        Self::Dirty,
+        Self::Slow,
+    ];
+
+    /// What of the motion is in the training recording.
+    #[must_use]
+    pub const fn recorded(self) -> Recorded {
+        match self {
+            Self::NoTensions => Recorded::NoTensions,
+            Self::MotorSide => Recorded::MotorSide,
+            Self::Dirty => Recorded::Dirty,
+            Self::Slow => Recorded::Slow,
+            _ => Recorded::Everything,
+        }
+    }
 
     /// Name in options, files and tables.
     #[must_use]
@@ -62,6 +112,12 @@ impl Group {
             Self::Nothing => "nothing",
             Self::Parameters => "parameters",
             Self::Outside => "outside",
+            Self::Many => "many",
+            Self::Geometry => "geometry",
+            Self::NoTensions => "no-tensions",
+            Self::MotorSide => "motor-side",
+            Self::Dirty => "dirty",
+            Self::Slow => "slow",
         }
     }
 
@@ -71,7 +127,13 @@ impl Group {
             Self::Single => 12,
             Self::Pair | Self::Nothing | Self::Outside => 3,
             Self::Parameters => 2,
-            Self::Triple => 1,
+            Self::Triple
+            | Self::Many
+            | Self::Geometry
+            | Self::NoTensions
+            | Self::MotorSide
+            | Self::Dirty
+            | Self::Slow => 1,
         }
     }
 }
@@ -192,8 +254,54 @@ pub fn plans(seed: u64) -> Vec<Plan> {
             plans.push(Plan { off, noise, ..plan });
         }
     }
+    for number in 0..MANY {
+        let plan = Plan::new(Group::Many, &format!("{number:02}"), seed);
+        plans.push(Plan { effects: many(4 + number % 2, plan.seed), ..plan });
+    }
+    for number in 0..GEOMETRY {
+        let plan = Plan::new(Group::Geometry, &format!("{number:02}"), seed);
+        let effects = if number % 2 == 0 { Vec::new() } else { many(1, plan.seed) };
+        plans.push(Plan { effects, off: wrong_geometry(plan.seed), ..plan });
+    }
+    for (group, cases) in [
+        (Group::NoTensions, NO_TENSIONS),
+        (Group::MotorSide, OTHERWISE_RECORDED),
+        (Group::Dirty, OTHERWISE_RECORDED),
+        (Group::Slow, OTHERWISE_RECORDED),
+    ] {
+        for number in 0..cases {
+            let plan = Plan::new(group, &format!("{number:02}"), seed);
+            let effects = if number % HIDING_NOTHING == 0 { Vec::new() } else { many(1, plan.seed) };
+            plans.push(Plan { effects, ..plan });
+        }
+    }
     plans.sort_by_key(|plan| plan.group);
     plans
+}
+
+/// Effects of a clear size, at most two of a component.
+fn many(wanted: usize, seed: u64) -> Vec<(&'static str, f64)> {
+    let mut draw = Draw::new(seed);
+    let mut left = ids(false);
+    let mut effects: Vec<(&'static str, Component)> = Vec::new();
+    while effects.len() < wanted && !left.is_empty() {
+        let drawn = left.swap_remove(draw.index(left.len()));
+        if effects.iter().filter(|(_, component)| *component == drawn.1).count() < 2 {
+            effects.push(drawn);
+        }
+    }
+    effects.into_iter().map(|(id, _)| (id, 1.0)).collect()
+}
+
+/// Output radius and arm, each off by 4 to 6 % either way: more than a caliper errs, less than a glance at a plot shows.
+fn wrong_geometry(seed: u64) -> Vec<(Parameter, f64)> {
+    let mut draw = Draw::new(seed.wrapping_add(1));
+    [Parameter::OutputRadius, Parameter::Arm]
+        .map(|parameter| {
+            let change = draw.between(0.04, 0.06);
+            (parameter, if draw.index(2) == 0 { 1.0 - change } else { 1.0 + change })
+        })
+        .to_vec()
 }
 
 fn of_different_components(wanted: usize, seed: u64) -> Vec<(&'static str, f64)> {
@@ -293,6 +401,9 @@ mod tests {
         let others = [Group::Pair, Group::Triple, Group::Nothing, Group::Parameters];
         assert_eq!(others.map(|group| count(&plans, group)), [20, 10, 25, 25]);
         assert!(count(&plans, Group::Outside) >= 3 * 4);
+        let recorded = [Group::NoTensions, Group::MotorSide, Group::Dirty, Group::Slow];
+        assert_eq!(recorded.map(|group| count(&plans, group)), [20, 12, 12, 12]);
+        assert_eq!([Group::Many, Group::Geometry].map(|group| count(&plans, group)), [20, 20]);
     }
 
     #[test]
@@ -318,6 +429,15 @@ mod tests {
                     assert!(case.effects.is_empty() && (1..=3).contains(&plan.off.len()), "{}", plan.name);
                     assert!(plan.off.iter().all(|(_, ratio)| (ratio - 1.0).abs() > 0.09), "{:?}", plan.off);
                 }
+                Group::Geometry => {
+                    let off = |ratio: f64| (0.039..0.061).contains(&(ratio - 1.0).abs());
+                    assert!(plan.off.len() == 2 && plan.off.iter().all(|(_, ratio)| off(*ratio)));
+                    assert!(plan.hidden().len() <= 1);
+                }
+                Group::NoTensions | Group::MotorSide | Group::Dirty | Group::Slow => {
+                    assert!(plan.off.is_empty() && plan.hidden().len() <= 1, "{}", plan.name);
+                }
+                Group::Many => assert!((4..=5).contains(&plan.hidden().len()), "{}", plan.name),
                 _ => assert!(plan.off.is_empty() && !plan.hidden().is_empty()),
             }
         }
@@ -335,7 +455,7 @@ mod tests {
     #[test]
     fn a_quick_sample_has_all_groups_and_mixes_strength_and_noise() {
         let sample = quick_sample(plans(1));
-        assert_eq!(Group::ALL.map(|group| count(&sample, group)), [12, 3, 1, 3, 2, 3]);
+        assert_eq!(Group::ALL.map(|group| count(&sample, group)), [12, 3, 1, 3, 2, 3, 1, 1, 1, 1, 1, 1]);
         let singles: Vec<&Plan> = sample.iter().filter(|plan| plan.group == Group::Single).collect();
         let kinds: BTreeSet<&str> = singles
             .iter()

@@ -23,7 +23,7 @@ pub fn key(tool: &Tool, plan: &Plan, case: &Case) -> String {
 #[must_use]
 pub fn key_of_case(plan: &Plan, case: &Case) -> String {
     let mut hasher = DefaultHasher::new();
-    format!("{case:?} {}", plan.lumped).hash(&mut hasher);
+    format!("{case:?} {} {:?}", plan.lumped, plan.group.recorded()).hash(&mut hasher);
     format!("{:016x}", hasher.finish())
 }
 
@@ -87,6 +87,7 @@ pub fn write_case(plan: &Plan, case: &Case, folder: &Path) -> Result<Recording, 
     });
     let train = train.map_err(|_| format!("{}: the bench panicked", plan.name))?.map_err(bench)?;
     let heldout = heldout.map_err(bench)?;
+    let train = plan.group.recorded().of(train, plan.seed);
     for (name, recording) in [("train.csv", &train), ("heldout.csv", &heldout)] {
         let file = File::create(folder.join(name)).map_err(|error| failed(&error))?;
         recording.write_csv(BufWriter::new(file)).map_err(|error| failed(&error))?;

@@ -31,6 +31,10 @@ pub struct Score {
     pub heldout_ratio: Option<f64>,
     /// Held-out error of the true rig without its effects over that of the true one: what the effects are worth.
     pub effects_worth: Option<f64>,
+    /// Concealed effects, and those of them that are named.
+    pub named: [usize; 2],
+    /// Held-out error of the diagnosed rig over that of the rig file, of the channels that the training recording lacks.
+    pub unmeasured_ratio: Option<f64>,
     /// Stated probability and whether it was right, for each named effect.
     pub statements: Vec<(f64, bool)>,
 }
@@ -40,7 +44,8 @@ pub struct Score {
 pub fn score(outcome: &Outcome) -> Score {
     let silent = catalogued(outcome).then_some(false);
     let Some(said) = &outcome.said else {
-        return Score { top1: silent, all_named: silent, ..Score::default() };
+        let named = [outcome.truth.effects.len(), 0];
+        return Score { top1: silent, all_named: silent, named, ..Score::default() };
     };
     let truth = &outcome.truth;
     let concealed = |id: &str| truth.effects.iter().any(|effect| effect.id == id);
@@ -55,7 +60,11 @@ pub fn score(outcome: &Outcome) -> Score {
             Group::Outside => said.verdict == "unexplained" && component(said, truth) == Some(true),
             Group::Nothing => exact && matches!(said.verdict.as_str(), "consistent" | "recalibrate"),
             Group::Parameters => exact && said.verdict == "recalibrate",
-            Group::Single | Group::Pair | Group::Triple => exact,
+            Group::Geometry if truth.effects.is_empty() => exact && said.verdict == "recalibrate",
+            Group::NoTensions | Group::MotorSide | Group::Dirty | Group::Slow if truth.effects.is_empty() => {
+                exact && matches!(said.verdict.as_str(), "consistent" | "recalibrate")
+            }
+            _ => exact,
         },
         top1: catalogued(outcome).then(|| said.effects.first().is_some_and(|effect| concealed(&effect.id))),
         all_named: catalogued(outcome).then_some(all_named),
@@ -77,6 +86,13 @@ pub fn score(outcome: &Outcome) -> Score {
             .collect(),
         heldout_ratio: ratio(&replays.diagnosed, &replays.truth),
         effects_worth: ratio(&replays.truth_without_effects, &replays.truth),
+        named: [truth.effects.len(), truth.effects.iter().filter(|effect| named(&effect.id)).count()],
+        unmeasured_ratio: {
+            let missing = outcome.group.recorded().missing();
+            let mut lacking = replays.diagnosed.clone();
+            lacking.retain(|channel, _| missing.contains(&channel.as_str()));
+            ratio(&lacking, &replays.believed)
+        },
         statements: said.effects.iter().map(|effect| (effect.probability, concealed(&effect.id))).collect(),
     }
 }

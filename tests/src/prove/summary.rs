@@ -122,6 +122,14 @@ impl Summary {
         let hiding_nothing = || self.group(Group::Nothing).chain(self.group(Group::Parameters));
         let false_physics = Rate::count(hiding_nothing().map(|score| !score.false_alarms.is_empty()));
         let outside = Rate::count(self.group(Group::Outside).map(|score| score.right));
+        let of_many = self.group(Group::Many).map(|score| score.named);
+        let [concealed, named] = of_many.fold([0, 0], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+        let named = Rate { hits: named, of: concealed };
+        let clean = Rate::count(self.group(Group::Many).map(|score| score.false_alarms.is_empty()));
+        let right = |group| Rate::count(self.group(group).map(|score| score.right));
+        let [geometry, dirty, slow, no_tensions, motor_side] =
+            [Group::Geometry, Group::Dirty, Group::Slow, Group::NoTensions, Group::MotorSide].map(right);
+        let unmeasured = median(self.cases.iter().filter_map(|(_, score)| score.unmeasured_ratio));
         let ratio = median(self.heldout_ratios());
         let certain = self.certain();
         let share = |value: Option<f64>| value.map_or("no case".to_owned(), |value| format!("{value:.2}"));
@@ -155,6 +163,54 @@ impl Summary {
                 found: outside.to_string(),
                 wanted: "≥ 90 %",
                 met: at_least(outside, 0.90),
+            },
+            Goal {
+                what: "four or five effects: named",
+                found: named.to_string(),
+                wanted: "≥ 80 %",
+                met: at_least(named, 0.80),
+            },
+            Goal {
+                what: "four or five effects: nothing false beside them",
+                found: clean.to_string(),
+                wanted: "≥ 90 %",
+                met: at_least(clean, 0.90),
+            },
+            Goal {
+                what: "radius and arm wrong: right",
+                found: geometry.to_string(),
+                wanted: "≥ 90 %",
+                met: at_least(geometry, 0.90),
+            },
+            Goal {
+                what: "dirty files: right",
+                found: dirty.to_string(),
+                wanted: "≥ 90 %",
+                met: at_least(dirty, 0.90),
+            },
+            Goal {
+                what: "recorded at 100 Hz: right",
+                found: slow.to_string(),
+                wanted: "≥ 90 %",
+                met: at_least(slow, 0.90),
+            },
+            Goal {
+                what: "encoders and motor alone: right",
+                found: no_tensions.to_string(),
+                wanted: "≥ 80 %",
+                met: at_least(no_tensions, 0.80),
+            },
+            Goal {
+                what: "tensions at the motor alone: right",
+                found: motor_side.to_string(),
+                wanted: "≥ 80 %",
+                met: at_least(motor_side, 0.80),
+            },
+            Goal {
+                what: "channels that were not recorded: error over the rig file's, median",
+                found: share(unmeasured),
+                wanted: "≤ 1",
+                met: unmeasured.map(|ratio| ratio <= 1.0),
             },
             Goal {
                 what: "held-out error over that of the truth, median",

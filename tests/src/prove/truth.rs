@@ -249,6 +249,8 @@ fn nominal(bench: &BenchConfig) -> BTreeMap<String, f64> {
         ("motor.resistance_ohm", bench.resistance_ohm),
         ("motor.torque_constant_nm_per_a", bench.torque_constant_nm_per_a),
         ("load.mass_kg", bench.mass_kg),
+        ("pulleys.output_radius_m", bench.output_radius_m),
+        ("load.arm_m", bench.arm_m),
     ]
     .into_iter()
     .map(|(path, value)| (path.to_owned(), value))
