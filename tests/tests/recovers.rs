@@ -36,6 +36,7 @@ fn motor_cogging() {
         cycles_per_turn: 30.0,
         phase_rad: 0.8,
         second_harmonic: 0.1,
+        third_harmonic: 0.0,
     };
     Recovery::of(concealed, 3, |effect| effect.with("cycles_per_turn", 30.0))
         .finds("amplitude_nm", 0.14, 0.1 * 0.14)

@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use bowden_control::correction::ripple_table::RippleTable;
 use bowden_control::parameters::Parameters;
 use bowden_control::service::{Identity, ParameterStore, Port, Reply, Service, StoreError, View};
 use bowden_control::tick::Command;
@@ -9,6 +10,7 @@ use bowden_link::message::{Boot, Provocation};
 use bowden_link::{Accumulator, Fault, FaultRecord, FromBoard, Request, Sample, State};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::select::{Either, select};
+use embassy_futures::yield_now;
 use embassy_stm32::flash::{self, Flash};
 use embassy_time::{Duration, Instant, Ticker, Timer};
 use embassy_usb::class::cdc_acm::Receiver;
@@ -17,7 +19,7 @@ use crate::queues::HostEnds;
 use crate::retained::{self, Ended};
 use crate::telemetry::ANSWERS;
 use crate::usb::{PACKET, UsbDriver};
-use crate::{BOARD, bridge, encoders, tick};
+use crate::{BOARD, TABLE_STORE, bridge, encoders, tick};
 
 /// Time between two looks at the silence of the host.
 const SUPERVISION: Duration = Duration::from_millis(5);
@@ -39,12 +41,27 @@ pub fn rounds() -> u32 {
     ROUNDS.load(Ordering::Relaxed)
 }
 
-/// The stored parameters; defaults if there are none, and why they could not be used if they could not.
-pub async fn load(store: &mut ParameterStore<BoardFlash>) -> (Parameters, Option<StoreError>) {
-    match store.load().await {
-        Ok(parameters) => (parameters.unwrap_or_default(), None),
-        Err(error) => (Parameters::default(), Some(error)),
-    }
+/// What the stores had.
+pub struct Loaded {
+    /// The stored parameters; defaults if there are none or they cannot be used.
+    pub parameters: Parameters,
+    /// The store has something that is no set of parameters.
+    unreadable: bool,
+    /// The stored ripple table.
+    table: Result<Option<RippleTable>, StoreError>,
+}
+
+/// Reads both stores.
+pub async fn load(store: &mut ParameterStore<BoardFlash>) -> Loaded {
+    let (parameters, unreadable) = match store.load().await {
+        Ok(parameters) => (parameters.unwrap_or_default(), false),
+        Err(_) => (Parameters::default(), true),
+    };
+    let table = match store.tables(TABLE_STORE) {
+        Ok(mut tables) => tables.load().await,
+        Err(error) => Err(error),
+    };
+    Loaded { parameters, unreadable, table }
 }
 
 /// What answers the host.
@@ -120,25 +137,33 @@ impl Reach {
 }
 
 impl Host {
-    /// Answers with `parameters`; a fault that ended the run before, or that the store has, stops the board until the host
+    /// Answers with what the stores had, which the tick gets of it; a fault that ended the run before, or that the store has, stops the board until the host
     /// has cleared it.
     pub fn new(
-        parameters: Parameters,
+        loaded: Loaded,
         store: ParameterStore<BoardFlash>,
         ends: HostEnds,
         boot: Boot,
         ended: &Ended,
-        unreadable: Option<StoreError>,
     ) -> Self {
+        let Loaded { parameters, unreadable, table } = loaded;
         let identity = Identity { firmware: env!("CARGO_PKG_VERSION"), board: BOARD, boot };
         let mut reach = Reach { ends, state: State::Off, fault: None };
-        let broken = unreadable.map(|_| Fault::ParameterStoreCorrupt);
+        let broken = if unreadable {
+            Some(Fault::ParameterStoreCorrupt)
+        } else {
+            table.is_err().then_some(Fault::RippleTableCorrupt)
+        };
         if let Some(fault) = ended.fault.or(broken) {
             // The queue is empty.
             let _ = reach.command(Command::Trip(fault, 0, 1.0, 0.0));
         }
-        let service = Service::new(identity, parameters, &ended.text);
-        Self { service, store, unreadable: unreadable.is_some(), reach, incoming: Accumulator::default() }
+        if let Ok(Some(table)) = &table {
+            // There is room for four commands.
+            let _ = reach.command(Command::Table(Some(*table)));
+        }
+        let service = Service::new(identity, parameters, &ended.text).with_table(&table);
+        Self { service, store, unreadable, reach, incoming: Accumulator::default() }
     }
 
     async fn take(&mut self, bytes: &[u8]) {
@@ -152,11 +177,25 @@ impl Host {
     }
 
     /// A store that could not be read holds nothing to lose and is erased first; any other keeps its old set if writing fails.
+    /// A stored ripple table that cannot be read stays until another one, or none, takes its place.
     async fn store(&mut self) -> bool {
+        if !self.service.table_is_unreadable() && !self.store_table().await {
+            return false;
+        }
+        // Up to two pages were erased; the watchdog is petted before others are.
+        count_round();
+        yield_now().await;
         if self.unreadable {
             self.unreadable = self.store.erase().await.is_err();
         }
         self.store.save(self.service.parameters()).await.is_ok()
+    }
+
+    async fn store_table(&mut self) -> bool {
+        match self.store.tables(TABLE_STORE) {
+            Ok(mut tables) => tables.save(self.service.table()).await.is_ok(),
+            Err(_) => false,
+        }
     }
 
     async fn answer(&mut self, request: &Request) {
@@ -202,6 +241,11 @@ fn now_ms() -> u32 {
     Instant::now().as_millis() as u32
 }
 
+/// One more of [`rounds`]; this task is the only writer.
+fn count_round() {
+    ROUNDS.store(ROUNDS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+}
+
 /// Answers the host and watches over its silence.
 #[embassy_executor::task]
 pub async fn run(mut host: Host, mut port: Receiver<'static, UsbDriver>) {
@@ -232,7 +276,6 @@ pub async fn run(mut host: Host, mut port: Receiver<'static, UsbDriver>) {
             host.reach.listen();
             host.service.supervise(now_ms(), &mut host.reach);
         }
-        // The only writer.
-        ROUNDS.store(ROUNDS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        count_round();
     }
 }

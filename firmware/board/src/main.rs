@@ -48,6 +48,9 @@ const BOARD: &str = "nucleo-g474re";
 /// Parameter store: the last four pages, in the bank that no code runs from.
 const STORE: core::ops::Range<u32> = 0x7_e000..0x8_0000;
 
+/// Store of the ripple table: the two pages before.
+const TABLE_STORE: core::ops::Range<u32> = 0x7_d000..0x7_e000;
+
 /// After this time without a sign of life the board is reset. Two pages erase in 44 ms (DS12288, `tERASE` 22 ms each).
 const WATCHDOG_US: u32 = 150_000;
 
@@ -67,8 +70,9 @@ async fn main(spawner: Spawner) {
 
     let flash = BlockingAsync::new(Flash::new_blocking(p.FLASH));
     let mut store = ParameterStore::new(flash, STORE).expect("the store fits the flash");
-    let (parameters, unreadable) = host::load(&mut store).await;
+    let loaded = host::load(&mut store).await;
     watchdog.pet();
+    let parameters = loaded.parameters.clone();
 
     let rate = parameters.rate_divider();
     let bridge = bridge::Bridge::new(p.TIM1, (p.PA8, p.PB13), (p.PA9, p.PB14), p.PB12, p.PC6, rate);
@@ -79,7 +83,7 @@ async fn main(spawner: Spawner) {
     encoders::start(parameters.encoder_parts());
     let queues = queues::split();
     // Puts the order to stop after a bad end into the queue before the first tick.
-    let host = host::Host::new(parameters.clone(), store, queues.host, boot, &ended, unreadable);
+    let host = host::Host::new(loaded, store, queues.host, boot, &ended);
     tick::start(&parameters, bridge, analog, Output::new(p.PC8, Level::Low, Speed::VeryHigh), queues.tick);
 
     let (port, device) = usb::new(p.USB, p.PA12, p.PA11);

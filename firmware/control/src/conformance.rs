@@ -5,18 +5,21 @@
 //! workstation that print the same number for the same seed have computed the same.
 
 mod corrections;
+mod table;
 
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{Fault, State};
 
 use crate::compensator::{Compensator, CompensatorInput, CompensatorState, compensate};
 use crate::controller::Controller;
+use crate::correction::ripple_table::RippleTable;
 use crate::parameters::Parameters;
 use crate::scale::{Angle, Quantity, Speed, Torque};
 use crate::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
 use crate::{reference_config, tick_config};
 
 pub use corrections::correction_digest;
+pub use table::ripple_table_digest;
 
 /// What a run came by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,11 +41,11 @@ pub fn digest(seed: u32, ticks: u32) -> u32 {
 /// Runs `ticks` ticks of compensator and controller for each of the three sources of the lag angle.
 #[must_use]
 pub fn run(seed: u32, ticks: u32) -> Outcome {
-    run_with(seed, ticks, |_| {})
+    run_with(seed, ticks, None, |_| {})
 }
 
-/// The same with other parameters than the usual ones.
-fn run_with(seed: u32, ticks: u32, prepare: fn(&mut Parameters)) -> Outcome {
+/// The same with a ripple table and other parameters than the usual ones.
+fn run_with(seed: u32, ticks: u32, table: Option<&RippleTable>, prepare: fn(&mut Parameters)) -> Outcome {
     let mut hash = Hash::default();
     let mut outcome = Outcome::default();
     for source in 0..3_u8 {
@@ -63,8 +66,12 @@ fn run_with(seed: u32, ticks: u32, prepare: fn(&mut Parameters)) -> Outcome {
         }
         let mut controller = Controller::new(config);
         let mut world = World::new(random);
+        let mut table = table.map(|table| Command::Table(Some(*table)));
         for _ in 0..ticks {
             let (input, mut inbox) = world.next(&parameters, &controller);
+            if inbox.command.is_none() {
+                inbox.command = table.take();
+            }
             let output = controller.tick(&input, &mut inbox);
             hash.output(&output);
             outcome.states |= 1 << output.sample.state as u8;

@@ -8,6 +8,7 @@ use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
 
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
 use crate::correction::lead::{Lead, Led};
+use crate::correction::ripple_table::RippleTable;
 use crate::drive::yielding::YieldInput;
 use crate::drive::{Loops, PositionInput, TorqueInput};
 use crate::encoder::EncoderChannel;
@@ -37,6 +38,7 @@ pub struct Controller {
     reference: ReferenceState,
     /// Reference that was set with the bridge off.
     waiting: Option<ReferenceConfig>,
+    table: Option<RippleTable>,
     /// The bridge goes on in this tick.
     starts: bool,
     compensator: CompensatorState,
@@ -88,6 +90,7 @@ impl Controller {
             sheaths: SheathObserver::default(),
             reference: ReferenceState::default(),
             waiting: None,
+            table: None,
             starts: false,
             compensator: CompensatorState::default(),
             lead: Lead::default(),
@@ -172,6 +175,10 @@ impl Controller {
                     State::Run if !self.starts => self.reference.follow(*reference),
                     _ => self.waiting = Some(*reference),
                 }
+                None
+            }
+            Command::Table(table) => {
+                self.table = *table;
                 None
             }
             &Command::Trip(fault, channel, got, limit) => Some(Detection { fault, channel, got, limit }),
@@ -289,6 +296,7 @@ impl Controller {
         };
         let reference = self.reference.step(&bounds, window, inbox, limits);
         let rate_sign = reference.change.signum() as i32;
+        let ripple = config.drive.correction.ripple(self.table.as_ref(), readings.motion.angle);
         let (torque, command) = if torque_mode || mode == Mode::Impedance {
             let wanted = if torque_mode {
                 Torque::from_bits(reference.value_bits)
@@ -301,7 +309,10 @@ impl Controller {
                 };
                 config.impedance.torque(&joint, limits)
             };
-            (Self::torque(config, &mut self.loops, readings, wanted, rate_sign, limits), readings.theta[0])
+            (
+                Self::torque(config, &mut self.loops, readings, wanted, rate_sign, ripple, limits),
+                readings.theta[0],
+            )
         } else {
             compensation.theta_d = Angle::from_bits(reference.value_bits);
             compensation.omega_d = reference.speed(config.rate_hz);
@@ -328,6 +339,7 @@ impl Controller {
                 measured: readings.theta[0],
                 motion: readings.motion,
                 torque_in: readings.load,
+                ripple,
             };
             let mut torque = self.loops.position(&config.position, &config.drive, &position, limits);
             if mode == Mode::Hybrid {
@@ -351,6 +363,7 @@ impl Controller {
         readings: &Readings,
         wanted: Torque,
         rate_sign: i32,
+        ripple: Torque,
         limits: &mut Limits,
     ) -> Torque {
         let theta = readings.theta[1];
@@ -371,6 +384,7 @@ impl Controller {
             friction: readings.sheath.friction_torque,
             motion: readings.motion,
             direction,
+            ripple,
         };
         loops.torque(&config.torque, &config.drive, &input, limits)
     }

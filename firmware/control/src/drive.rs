@@ -135,6 +135,8 @@ pub struct PositionInput {
     pub motion: Motion,
     /// Measured input torque `(F1 - F3) r1`.
     pub torque_in: Torque,
+    /// Torque that cancels the motor's ripple.
+    pub ripple: Torque,
 }
 
 /// What the torque loop follows and sees.
@@ -156,6 +158,8 @@ pub struct TorqueInput {
     pub motion: Motion,
     /// Direction of motion, see [`Loops::direction`].
     pub direction: Share,
+    /// Torque that cancels the motor's ripple.
+    pub ripple: Torque,
 }
 
 impl Loops {
@@ -189,7 +193,7 @@ impl Loops {
         }
         let wanted = config.acceleration_feedforward.apply(input.acceleration);
         let wanted = self.feedforward.approach(config.acceleration_filter, wanted);
-        let motor = drive.correction.torque_along(input.command_speed, input.motion.angle, input.torque_in);
+        let friction = drive.correction.torque_along(input.command_speed, input.torque_in);
         let speed_error = input.command_speed.minus(input.motion.speed);
         let acceleration = config
             .proportional
@@ -201,7 +205,7 @@ impl Loops {
             .inertia
             .apply(acceleration)
             .plus(drive.viscous.apply(input.motion.speed))
-            .plus(motor)
+            .plus(friction.plus(input.ripple))
             .plus(config.load_feedforward.apply(input.torque_in))
     }
 
@@ -234,8 +238,17 @@ impl Loops {
         input: &TorqueInput,
         limits: &mut Limits,
     ) -> Torque {
-        let TorqueInput { wanted, rate_sign, measured, load, measured_load, friction, motion, direction } =
-            *input;
+        let TorqueInput {
+            wanted,
+            rate_sign,
+            measured,
+            load,
+            measured_load,
+            friction,
+            motion,
+            direction,
+            ripple,
+        } = *input;
         let speed = motion.speed;
         match rate_sign {
             1.. => self.falls = false,
@@ -256,7 +269,7 @@ impl Loops {
             .plus(config.proportional.apply(error))
             .plus(self.torque.value())
             .plus(drive.viscous.apply(speed))
-            .plus(drive.correction.torque(direction, speed, motion.angle, load))
+            .plus(drive.correction.torque(direction, speed, load).plus(ripple))
             .minus(config.damping.apply(speed))
             .minus(config.lead.apply(measured_load.minus(slow)))
     }
@@ -364,6 +377,7 @@ mod tests {
                 measured: motion.angle,
                 motion,
                 torque_in: Torque::ZERO,
+                ripple: Torque::ZERO,
             };
             for _ in 0..1000 {
                 limits = Limits::default();

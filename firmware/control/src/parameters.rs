@@ -14,7 +14,7 @@ pub use configure::{ReferenceConfig, TickConfig, reference_config, tick_config};
 pub use corrections::{
     BacklashParameters, CoggingParameters, Corrections, DeadZoneParameters, EccentricityParameters,
     GearFrictionParameters, JointFrictionParameters, JointSpringParameters, MotorFrictionParameters,
-    SheathFrictionParameters,
+    RippleTableParameters, SheathFrictionParameters,
 };
 pub use groups::{
     Bounds, Bridge, Compensation, Control, Encoder, Encoders, Impedance, Load, Loops, Motor, Pulleys,

@@ -3,7 +3,9 @@
 //! Nothing here runs in the control tick. The tick is reached through [`Port`], whose queues never make it wait.
 
 pub mod batcher;
+mod shelf;
 pub mod store;
+pub mod table_store;
 
 use bowden_link::message::{Boot, Goal, Greeting, Mode, Parameter, Provocation, Reference, Refusal, Status};
 use bowden_link::{
@@ -11,11 +13,13 @@ use bowden_link::{
 };
 use heapless::String;
 
+use crate::correction::ripple_table::RippleTable;
 use crate::parameters::{Parameters, check_reference};
 use crate::reference::reference_config;
 use crate::supervisor::allows;
 use crate::tick::Command;
 use crate::tick_config;
+use shelf::Shelf;
 
 pub use batcher::Batcher;
 pub use store::{ParameterStore, StoreError};
@@ -78,7 +82,7 @@ pub struct Identity {
 pub enum Reply {
     /// Send this.
     Say(FromBoard),
-    /// Write [`Service::parameters`] to flash, then send [`Service::stored`].
+    /// Write [`Service::parameters`] and [`Service::table`] to flash, then send [`Service::stored`].
     Store,
     /// Send [`FromBoard::Done`], then suffer this.
     Suffer(Provocation),
@@ -92,6 +96,7 @@ pub const PANIC_TEXT: usize = 128;
 pub struct Service {
     identity: Identity,
     parameters: Parameters,
+    shelf: Shelf,
     panic_text: String<PANIC_TEXT>,
     telemetry: bool,
     heard_ms: u32,
@@ -116,6 +121,7 @@ impl Service {
         Self {
             identity,
             parameters,
+            shelf: Shelf::new(&Ok(None)),
             panic_text: kept,
             telemetry: false,
             heard_ms: 0,
@@ -124,6 +130,24 @@ impl Service {
             waiting: None,
             mode: None,
         }
+    }
+
+    /// The same with what the store had for a ripple table; the tick gets it by [`Command::Table`]. While the stored one
+    /// cannot be read, a fault is not cleared.
+    #[must_use]
+    pub fn with_table(mut self, loaded: &Result<Option<RippleTable>, StoreError>) -> Self {
+        self.shelf = Shelf::new(loaded);
+        self
+    }
+
+    /// The ripple table that is there, whether it is switched on or not.
+    pub const fn table(&self) -> Option<&RippleTable> {
+        self.shelf.acting()
+    }
+
+    /// Whether the stored ripple table cannot be read, and no other took its place.
+    pub const fn table_is_unreadable(&self) -> bool {
+        self.shelf.is_unreadable()
     }
 
     /// The parameters that act.
@@ -191,6 +215,15 @@ impl Service {
                 }
                 Err(Refusal::Forbidden(Parameters::index_of("supervisor.allow_provoke").unwrap_or(u16::MAX)))
             }
+            ToBoard::WriteTablePoints { first, points_raw } => {
+                at_rest(port).and_then(|()| self.shelf.receive(*first, points_raw))
+            }
+            ToBoard::ActivateTable(head) => {
+                self.shelf.arrived(head).and_then(|table| self.shelve(Some(&table), port))
+            }
+            ToBoard::ReadTable => Ok(FromBoard::Table(self.shelf.report())),
+            ToBoard::ReadTablePoints(first) => self.shelf.points(*first),
+            ToBoard::ClearTable => self.shelve(None, port),
         };
         Reply::Say(answer.unwrap_or_else(FromBoard::Refused))
     }
@@ -244,9 +277,7 @@ impl Service {
     }
 
     fn adopt(&mut self, parameters: Parameters, port: &mut impl Port) -> Result<FromBoard, Refusal> {
-        if port.view().state.drives() {
-            return Err(Refusal::Moving);
-        }
+        at_rest(port)?;
         self.act_on(parameters, port)
     }
 
@@ -259,11 +290,22 @@ impl Service {
         Ok(done)
     }
 
+    /// The tick takes another ripple table, or none.
+    fn shelve(&mut self, table: Option<&RippleTable>, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        at_rest(port)?;
+        let done = send(port, Command::Table(table.copied()))?;
+        self.shelf.put(table);
+        Ok(done)
+    }
+
     /// A run is refused whose reference the joint cannot do in its mode: nothing has moved yet.
     fn enter(&mut self, goal: Goal, port: &mut impl Port) -> Result<FromBoard, Refusal> {
         let state = port.view().state;
         if !allows(state, goal) {
             return Err(Refusal::WrongState(state));
+        }
+        if goal == Goal::ClearFault && self.shelf.is_unreadable() {
+            return Err(Refusal::TableUnreadable);
         }
         let mode = if let Goal::Run(mode) = goal { Some(mode) } else { None };
         if let (Some(mode), Some(reference)) = (mode, self.waiting) {
@@ -329,6 +371,11 @@ impl Service {
             snapshot,
         }
     }
+}
+
+/// Refuses what may not change while the bridge drives.
+fn at_rest(port: &impl Port) -> Result<(), Refusal> {
+    if port.view().state.drives() { Err(Refusal::Moving) } else { Ok(()) }
 }
 
 #[expect(clippy::large_types_passed_by_value, reason = "moved into the queue")]

@@ -3,6 +3,8 @@
 use bowden_link::message::Goal;
 use bowden_link::{Fault, FaultRecord, Sample};
 
+use crate::correction::ripple_table::RippleTable;
+
 pub use crate::parameters::{ReferenceConfig, TickConfig};
 
 /// An encoder as the board read it last.
@@ -53,6 +55,8 @@ pub enum Command {
     Configure(TickConfig),
     /// Change the state; ignored where [`crate::supervisor::allows`] says no.
     Enter(Goal),
+    /// Use this ripple table from now on, or none.
+    Table(Option<RippleTable>),
     /// Follow this reference, from the present one on, smoothly.
     SetReference(ReferenceConfig),
     /// Stop: something outside the tick went wrong. Fault, channel as in [`FaultRecord::channel`], what was measured,

@@ -2,10 +2,13 @@
 
 use std::collections::VecDeque;
 
+use bowden_control::correction::ripple_table::RippleTable;
 use bowden_control::parameters::Parameters;
-use bowden_control::service::{Identity, Port, Reply, Service, View};
+use bowden_control::service::{Identity, Port, Reply, Service, StoreError, View};
 use bowden_control::tick::Command;
-use bowden_link::message::{Boot, Goal, Mode, Provocation, Reference, Refusal, Shape};
+use bowden_link::message::{
+    Boot, Goal, Mode, Provocation, Reference, Refusal, Shape, TABLE_CHUNK, TABLE_POINTS, TableReport,
+};
 use bowden_link::{Fault, FromBoard, PROTOCOL_VERSION, Request, Sample, State, ToBoard};
 
 /// A tick that takes up to four commands and eight points.
@@ -201,4 +204,82 @@ fn a_reference_that_the_joint_cannot_do_is_refused_before_the_run() {
     let largest = out_of_range(asked(&mut service, &mut tick, 6, sine(0.8, 5.0)), 0.8);
     assert_eq!(asked(&mut service, &mut tick, 7, sine(largest, 5.0)), Reply::Say(FromBoard::Done));
     assert_eq!(tick.commands.len(), 3);
+}
+
+fn table() -> RippleTable {
+    RippleTable::new(0.5, 0.25, &std::array::from_fn(|point| 100 * point.cast_signed() as i16)).unwrap()
+}
+
+/// Sends all points; the answers.
+fn send_points(service: &mut Service, tick: &mut Tick) -> Vec<Reply> {
+    let table = table();
+    let parts = table.points_raw().chunks(TABLE_CHUNK).map(|part| part.iter().copied().collect());
+    (0..)
+        .step_by(TABLE_CHUNK)
+        .zip(parts.collect::<Vec<_>>())
+        .map(|(first, points_raw)| {
+            asked(service, tick, first, ToBoard::WriteTablePoints { first, points_raw })
+        })
+        .collect()
+}
+
+#[test]
+fn a_table_reaches_the_tick_only_whole() {
+    let (mut service, mut tick) = (service(), tick_in(State::Off));
+    let activate = || ToBoard::ActivateTable(table().head());
+    assert_eq!(asked(&mut service, &mut tick, 1, activate()), refused(Refusal::TableDiffers));
+    assert!(send_points(&mut service, &mut tick).iter().all(|reply| *reply == Reply::Say(FromBoard::Done)));
+    // Another period or scale than the checksum was made of, and one that there cannot be.
+    let mut other = table().head();
+    other.period_rad = 0.25;
+    assert_eq!(
+        asked(&mut service, &mut tick, 2, ToBoard::ActivateTable(other)),
+        refused(Refusal::TableDiffers)
+    );
+    other.full_scale_nm = f32::NAN;
+    let reply = asked(&mut service, &mut tick, 3, ToBoard::ActivateTable(other));
+    assert!(matches!(reply, Reply::Say(FromBoard::Refused(Refusal::OutOfRange { .. }))), "{reply:?}");
+    // A tick without room leaves things as they are.
+    while tick.command(Command::Enter(Goal::Off)) {}
+    assert_eq!(asked(&mut service, &mut tick, 4, activate()), refused(Refusal::Busy));
+    assert_eq!(service.table(), None);
+    tick.commands.clear();
+    assert_eq!(asked(&mut service, &mut tick, 5, activate()), Reply::Say(FromBoard::Done));
+    assert_eq!(
+        (service.table(), tick.commands.pop_front()),
+        (Some(&table()), Some(Command::Table(Some(table()))))
+    );
+    let report = Reply::Say(FromBoard::Table(TableReport::Whole(table().head())));
+    assert_eq!(asked(&mut service, &mut tick, 6, ToBoard::ReadTable), report);
+    // Read back from anywhere; the last part is short.
+    let last = asked(&mut service, &mut tick, 7, ToBoard::ReadTablePoints(TABLE_POINTS as u16 - 2));
+    let points_raw = [25_400, 25_500].into_iter().collect();
+    assert_eq!(last, Reply::Say(FromBoard::TablePoints(points_raw)));
+    let beyond = asked(&mut service, &mut tick, 8, ToBoard::ReadTablePoints(TABLE_POINTS as u16));
+    assert_eq!(beyond, refused(Refusal::NoSuchIndex));
+    // While the joint moves it stays.
+    tick.view.state = State::Run;
+    assert!(send_points(&mut service, &mut tick).iter().all(|reply| *reply == refused(Refusal::Moving)));
+    for message in [activate(), ToBoard::ClearTable] {
+        assert_eq!(asked(&mut service, &mut tick, 9, message), refused(Refusal::Moving));
+    }
+    tick.view.state = State::Ready;
+    assert_eq!(asked(&mut service, &mut tick, 10, ToBoard::ClearTable), Reply::Say(FromBoard::Done));
+    assert_eq!((service.table(), tick.commands.pop_front()), (None, Some(Command::Table(None))));
+}
+
+#[test]
+fn a_fault_stays_while_the_stored_table_cannot_be_read() {
+    for message in [ToBoard::ActivateTable(table().head()), ToBoard::ClearTable] {
+        let mut service = service().with_table(&Err(StoreError::Unusable));
+        let mut tick = tick_in(State::Fault);
+        let clear = || ToBoard::Enter(Goal::ClearFault);
+        assert_eq!(asked(&mut service, &mut tick, 1, clear()), refused(Refusal::TableUnreadable));
+        let report = Reply::Say(FromBoard::Table(TableReport::Unreadable));
+        assert_eq!(asked(&mut service, &mut tick, 2, ToBoard::ReadTable), report);
+        send_points(&mut service, &mut tick);
+        assert_eq!(asked(&mut service, &mut tick, 3, message), Reply::Say(FromBoard::Done));
+        assert!(!service.table_is_unreadable());
+        assert_eq!(asked(&mut service, &mut tick, 4, clear()), Reply::Say(FromBoard::Done));
+    }
 }

@@ -12,6 +12,12 @@ use crate::sample::{Batch, Sample};
 /// Reference points that one message carries at most.
 pub const STREAM_LENGTH: usize = 32;
 
+/// Points of a ripple table, over one period.
+pub const TABLE_POINTS: usize = 256;
+
+/// Points of a ripple table that one message carries at most.
+pub const TABLE_CHUNK: usize = 32;
+
 /// A request with its number; the answer repeats the number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Request {
@@ -68,6 +74,21 @@ pub enum ToBoard {
     ReadPanicText,
     /// Provokes a failure, to see that the motor stops; the parameter `supervisor.allow_provoke` has to be 1.
     Provoke(Provocation),
+    /// Fills a part of the table that is being sent; what acts stays as it is until [`ToBoard::ActivateTable`].
+    WriteTablePoints {
+        /// Index of the first point.
+        first: u16,
+        /// The points, as in [`TableHead::full_scale_nm`].
+        points_raw: Vec<i16, TABLE_CHUNK>,
+    },
+    /// The table that was sent acts from now on, if it is whole by its checksum.
+    ActivateTable(TableHead),
+    /// Asks for the [`TableReport`].
+    ReadTable,
+    /// Asks for the points of the table from this index on.
+    ReadTablePoints(u16),
+    /// Forgets the table.
+    ClearTable,
 }
 
 /// What the board says.
@@ -98,6 +119,34 @@ pub enum FromBoard {
     StreamFree(u16),
     /// Samples of control ticks.
     Telemetry(Batch),
+    /// The ripple table.
+    Table(TableReport),
+    /// Points of the ripple table, as in [`TableHead::full_scale_nm`].
+    TablePoints(Vec<i16, TABLE_CHUNK>),
+}
+
+/// What a ripple table says beside its points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TableHead {
+    /// Angle of the input pulley over which the table repeats, rad.
+    pub period_rad: f32,
+    /// Torque of a point of 32768, N·m.
+    pub full_scale_nm: f32,
+    /// CRC-32 of the whole table, as it is stored.
+    pub crc: u32,
+}
+
+/// State of the ripple table.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum TableReport {
+    /// There is none.
+    Absent,
+    /// There is one, whole.
+    Whole(TableHead),
+    /// The stored one cannot be read; the motor stays off until it is written anew or cleared.
+    Unreadable,
 }
 
 /// Who the board is.
@@ -279,7 +328,7 @@ pub enum Refusal {
     },
     /// The value is good by itself, but not together with others; the index names the other one.
     Conflict(u16),
-    /// This parameter can be changed with the bridge off only.
+    /// This parameter, or the ripple table, can be changed with the bridge off only.
     Moving,
     /// The present state does not lead to the state asked for.
     WrongState(State),
@@ -291,6 +340,10 @@ pub enum Refusal {
     Busy,
     /// A parameter forbids it; the index names it.
     Forbidden(u16),
+    /// The points on the board are not those that the checksum was made of.
+    TableDiffers,
+    /// The stored ripple table cannot be read.
+    TableUnreadable,
 }
 
 impl fmt::Display for Refusal {
@@ -301,11 +354,17 @@ impl fmt::Display for Refusal {
                 write!(f, "{got} is out of range, expected {minimum} to {maximum}")
             }
             Self::Conflict(index) => write!(f, "the value does not go with that of parameter {index}"),
-            Self::Moving => f.write_str("this parameter changes with the bridge off only; stop first"),
+            Self::Moving => f.write_str("this changes with the bridge off only; stop first"),
             Self::WrongState(state) => write!(f, "not possible in state {state}"),
             Self::StreamFull => f.write_str("the stream of references is full; send at its rate"),
             Self::Storage => f.write_str("the flash could not be written; old values are kept"),
             Self::Forbidden(index) => write!(f, "parameter {index} forbids it; set it to 1 first"),
+            Self::TableDiffers => {
+                f.write_str("the points on the board do not fit the table's checksum; send the table again")
+            }
+            Self::TableUnreadable => {
+                f.write_str("the stored ripple table cannot be read; write it anew or clear it first")
+            }
             Self::Busy => f.write_str("the board is busy with the request before; send it again"),
         }
     }

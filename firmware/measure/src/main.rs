@@ -9,6 +9,7 @@
 //! | 2, 3 | inputs and digest of `conformance::compensator_digest` |
 //! | 4, 5 | ticks and digest of `conformance::run` |
 //! | 6, 7, 8 | states and faults (low, high word) that `conformance::run` met |
+//! | 9, 10, 11 | ticks and digests of `conformance::correction_digest` and `conformance::ripple_table_digest` |
 //!
 //! | step | what |
 //! |---|---|
@@ -16,6 +17,7 @@
 //! | 2, 4, 6 | calls of `compensate`, `compensate_float` and [`control_tick`] on it, to be counted |
 //! | 7 | digest over compensator inputs |
 //! | 8 | digest over control ticks |
+//! | 9 | digests with every correction, and with a ripple table |
 //!
 //! A pause of 1 ms follows each step, so that whoever counts calls can tell the steps apart.
 #![no_std]
@@ -27,7 +29,9 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use bowden_control::compensator::float::{FloatCompensator, FloatInput, FloatState, compensate_float};
 use bowden_control::compensator::{Compensator, CompensatorInput, CompensatorState, compensate};
-use bowden_control::conformance::{amt22_frame, compensator_digest, run};
+use bowden_control::conformance::{
+    amt22_frame, compensator_digest, correction_digest, ripple_table_digest, run,
+};
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
 use bowden_control::scale::{Angle, Quantity, Speed, Torque};
@@ -42,6 +46,8 @@ const SEED: u32 = 20_260;
 const INPUTS: u32 = 1_200_000;
 /// Ticks of each configuration in the digest of whole ticks.
 const TICKS: u32 = 60_000;
+/// The same with corrections.
+const CORRECTED_TICKS: u32 = 20_000;
 /// Calls that are counted in a step.
 const CALLS: u32 = 20_000;
 /// 1 ms of the 16 MHz that the processor starts with.
@@ -49,7 +55,7 @@ const PAUSE_CYCLES: u32 = 16_000;
 
 /// Results, see the table above.
 #[used]
-static RESULTS: [AtomicU32; 9] = [const { AtomicU32::new(0) }; 9];
+static RESULTS: [AtomicU32; 12] = [const { AtomicU32::new(0) }; 12];
 
 fn tell(word: usize, value: u32) {
     RESULTS[word].store(value, Ordering::SeqCst);
@@ -83,6 +89,10 @@ fn main() -> ! {
     tell(7, outcome.faults as u32);
     tell(8, (outcome.faults >> 32) as u32);
     step_done(8);
+    tell(9, CORRECTED_TICKS);
+    tell(10, correction_digest(SEED, CORRECTED_TICKS));
+    tell(11, ripple_table_digest(SEED, CORRECTED_TICKS));
+    step_done(9);
     loop {
         cortex_m::asm::wfi();
     }

@@ -172,7 +172,11 @@ fn advice(refusal: &Refusal) -> &'static str {
         Refusal::Conflict(_) => "; change that one first",
         Refusal::Forbidden(_) => "; see `bowden params list`",
         Refusal::Storage => "; try again, then replace the board",
-        Refusal::Moving | Refusal::StreamFull | Refusal::Busy => "",
+        Refusal::Moving
+        | Refusal::StreamFull
+        | Refusal::Busy
+        | Refusal::TableDiffers
+        | Refusal::TableUnreadable => "",
     }
 }
 

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
-use bowden_link::message::{Boot, Goal, Greeting, Mode, Parameter, Reference, Refusal, Status};
+use bowden_link::message::{Boot, Goal, Greeting, Mode, Parameter, Reference, Refusal, Status, TableReport};
 use bowden_link::sample::BATCH_LENGTH;
 use bowden_link::{
     Answer, Batch, Fault, FaultRecord, FromBoard, Limits, PROTOCOL_VERSION, Request, SCHEMA, Sample, State,
@@ -419,7 +419,11 @@ impl Fake {
             ToBoard::ReadPanicText => {
                 return Ok(FromBoard::PanicText("index out of bounds at tick.rs:7".try_into().unwrap()));
             }
-            ToBoard::Alive | ToBoard::Provoke(_) => {}
+            ToBoard::ReadTable => return Ok(FromBoard::Table(TableReport::Unreadable)),
+            ToBoard::ReadTablePoints(_) => return Err(Refusal::NoSuchIndex),
+            ToBoard::ActivateTable(_) => return Err(Refusal::TableDiffers),
+            ToBoard::Alive | ToBoard::Provoke(_) | ToBoard::WriteTablePoints { .. } | ToBoard::ClearTable => {
+            }
         }
         Ok(FromBoard::Done)
     }

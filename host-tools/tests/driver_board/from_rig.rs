@@ -15,7 +15,7 @@ use crate::mishaps::Mishaps;
 use crate::wires::connect;
 
 /// The bench as both boards have it by default, but for the resistance and what `more` says of effects.
-fn rig(effects: &str, more: &str) -> String {
+pub fn rig(effects: &str, more: &str) -> String {
     format!(
         "schema = \"bowden-rig/1\"\nname = \"bench\"\n\
          [motor]\nsupply_v = 24.0\nresistance_ohm = 2.5\ninductance_h = 0.0008\ntorque_constant_nm_per_a = 0.03\n\
@@ -229,7 +229,7 @@ fn a_refusal_leaves_the_board_as_it_was() {
         assert_eq!(failure.class(), FailureClass::Failed);
         assert_eq!(
             failure.message(),
-            "tendon.pretension: the board refused 28.0: this parameter changes with the bridge off only; stop first; \
+            "tendon.pretension: the board refused 28.0: this changes with the bridge off only; stop first; \
              nothing was changed"
         );
         assert_eq!(ParameterSet::read(&mut client).unwrap(), parameters);

@@ -197,7 +197,13 @@ fn joint_backlash_opens_between_the_encoders_with_the_sign_of_joint_torque() {
 fn motor_cogging_is_a_torque_over_position() {
     let reference = strokes();
     let base = plain(&bench(), &reference);
-    let law = MotorCogging { amplitude_nm: 0.1, cycles_per_turn: 40.0, phase_rad: 0.7, second_harmonic: 0.0 };
+    let law = MotorCogging {
+        amplitude_nm: 0.1,
+        cycles_per_turn: 40.0,
+        phase_rad: 0.7,
+        second_harmonic: 0.0,
+        third_harmonic: 0.0,
+    };
     let with = run(&bench(), law, &reference);
     // Slow strokes only (0.3 rad/s: 1.9 Hz of cogging), where the rotor's inertia has no say.
     let rows = (0..base.len()).filter(|k| steady(&reference, *k) && speed(&reference, *k).abs() < 0.35);

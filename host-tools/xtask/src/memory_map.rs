@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-/// Bytes at the end of the flash that hold the parameters; the image stays below.
-pub const PARAMETER_STORE_BYTES: u64 = 8 << 10;
+/// Bytes at the end of the flash that hold parameters and ripple table; the image stays below.
+pub const PARAMETER_STORE_BYTES: u64 = 12 << 10;
 
 /// A region of memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -95,9 +95,9 @@ mod tests {
         let regions = read(&crate::process::workspace().join("memory.x")).unwrap();
         let names: Vec<_> = regions.iter().map(|region| region.name.as_str()).collect();
         assert_eq!(names, ["FLASH", "RAM", "CCM"]);
-        // The parameter store's first address is fixed: last four pages of 2 KiB.
+        // The first address of the stores is fixed: two pages of 2 KiB for the table, and the last four.
         let flash = &regions[0];
-        assert_eq!(flash.origin + flash.length - PARAMETER_STORE_BYTES, 0x0807_e000);
+        assert_eq!(flash.origin + flash.length - PARAMETER_STORE_BYTES, 0x0807_d000);
     }
 
     #[test]

@@ -17,6 +17,10 @@ pub struct Digests {
     pub ticks: u32,
     /// `conformance::run` over them: digest, states and faults met.
     pub outcome: bowden_control::conformance::Outcome,
+    /// Ticks of each configuration with corrections.
+    pub corrected_ticks: u32,
+    /// `conformance::correction_digest` and `conformance::ripple_table_digest` over them.
+    pub corrected: [u32; 2],
 }
 
 /// Cost of a function that was called often.
@@ -75,8 +79,8 @@ impl ControlAlone {
         // The results are zero when the start-up code is through.
         board.run_for(START_S)?;
         match board.static_data("RESULTS") {
-            Some((results_at, 36)) => Ok(Self { board, results_at }),
-            found => fail(format!("RESULTS of the image: {found:?}, expected 36 bytes")),
+            Some((results_at, 48)) => Ok(Self { board, results_at }),
+            found => fail(format!("RESULTS of the image: {found:?}, expected 48 bytes")),
         }
     }
 
@@ -125,9 +129,9 @@ impl ControlAlone {
         Ok(all)
     }
 
-    /// Digests of the compensator and of whole ticks.
+    /// Digests of the compensator, of whole ticks, and of ticks with corrections.
     pub fn digests(&mut self) -> Outcome<Digests> {
-        self.reach(8)?;
+        self.reach(9)?;
         Ok(Digests {
             seed: self.word(1)?,
             inputs: self.word(2)?,
@@ -138,6 +142,8 @@ impl ControlAlone {
                 states: self.word(6)? as u8,
                 faults: u64::from(self.word(7)?) | u64::from(self.word(8)?) << 32,
             },
+            corrected_ticks: self.word(9)?,
+            corrected: [self.word(10)?, self.word(11)?],
         })
     }
 }

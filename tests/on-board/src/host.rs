@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 
 use bowden_board::{Board, LogLine, ResetCause};
+use bowden_control::correction::ripple_table::RippleTable;
 use bowden_control::parameters::Parameters;
 use bowden_link::frame::FRAME_LENGTH;
-use bowden_link::message::{Goal, Greeting, Mode, Parameter, Reference, Status};
+use bowden_link::message::{Goal, Greeting, Mode, Parameter, Reference, Status, TABLE_CHUNK, TableReport};
 use bowden_link::{Accumulator, Answer, FaultRecord, FromBoard, Request, Sample, State, ToBoard, encode};
 
 use crate::telemetry::Telemetry;
@@ -315,6 +316,34 @@ impl Host {
                 other => fail(format!("{other:?} in answer to the question for a parameter")),
             })
             .collect()
+    }
+
+    // ---- ripple table -----------------------------------------------------------------------------------------
+
+    /// Sends a ripple table; what the board says to its activation.
+    pub fn try_table(&mut self, table: &RippleTable) -> Outcome<FromBoard> {
+        for (part, points_raw) in table.points_raw().chunks(TABLE_CHUNK).enumerate() {
+            let (first, points_raw) = ((part * TABLE_CHUNK) as u16, points_raw.iter().copied().collect());
+            self.order(&ToBoard::WriteTablePoints { first, points_raw })?;
+        }
+        self.ask(&ToBoard::ActivateTable(table.head()))
+    }
+
+    /// Sends a ripple table, or clears it.
+    pub fn put_table(&mut self, table: Option<&RippleTable>) -> Outcome {
+        let Some(table) = table else { return self.order(&ToBoard::ClearTable) };
+        match self.try_table(table)? {
+            FromBoard::Done => Ok(()),
+            other => fail(format!("{other:?} in answer to a ripple table")),
+        }
+    }
+
+    /// State of the ripple table.
+    pub fn table(&mut self) -> Outcome<TableReport> {
+        match self.ask(&ToBoard::ReadTable)? {
+            FromBoard::Table(report) => Ok(report),
+            other => fail(format!("{other:?} in answer to ReadTable")),
+        }
     }
 
     // ---- the joint --------------------------------------------------------------------------------------------

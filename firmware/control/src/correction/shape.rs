@@ -141,7 +141,7 @@ impl Harmonic {
 
     /// Phase at an angle, 2³² a turn.
     #[inline]
-    const fn phase_at(self, angle_bits: i32) -> u32 {
+    pub(super) const fn phase_at(self, angle_bits: i32) -> u32 {
         let turned = (angle_bits as i64 * self.phase_per_angle as i64) >> Self::EXTRA_BITS;
         (turned as u32).wrapping_add(self.phase)
     }

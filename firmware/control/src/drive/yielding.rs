@@ -164,6 +164,7 @@ mod tests {
                 measured: Angle::ZERO,
                 motion: Motion::default(),
                 torque_in: Torque::ZERO,
+                ripple: Torque::ZERO,
             };
             let _ = loops.position(&config.position, &config.drive, &input, &mut Limits::default());
             assert_eq!(loops.acceleration.value().to_bits() == 0, rests, "{yields} {error_rad}");

@@ -11,6 +11,8 @@ pub struct Corrections {
     pub gear_friction: GearFrictionParameters,
     /// Torque ripple of the motor.
     pub cogging: CoggingParameters,
+    /// The same by a table.
+    pub ripple_table: RippleTableParameters,
     /// Dead zone of the bridge.
     pub dead_zone: DeadZoneParameters,
     /// Dry friction of the joint.
@@ -70,6 +72,15 @@ pub struct CoggingParameters {
     pub periods_2: f32,
     /// Its phase at angle zero, rad.
     pub phase_2: f32,
+    /// Largest torque of this term, N·m.
+    pub limit: f32,
+}
+
+/// Torque ripple of the motor by a table, at the input pulley.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RippleTableParameters {
+    /// 1: on, in place of the harmonics.
+    pub enable: f32,
     /// Largest torque of this term, N·m.
     pub limit: f32,
 }

@@ -153,4 +153,6 @@ parameter_table! {
     impedance.stiffness, "N·m/rad", 0.0, 10_000.0, 2.0, true;
     impedance.damping, "N·m·s/rad", 0.0, 1000.0, 0.05, true;
     impedance.gravity, "", 0.0, 1.2, 1.0, true;
+    correction.ripple_table.enable, "", 0.0, 1.0, 0.0, true;
+    correction.ripple_table.limit, "N·m", 0.0, 20.0, 0.5, true;
 }

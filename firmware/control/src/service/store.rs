@@ -10,6 +10,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::NoCache;
 use sequential_storage::map::{MapConfig, MapStorage};
 
+use super::table_store::TableStore;
 use crate::parameters::Parameters;
 
 /// Key of the record; the only one.
@@ -32,7 +33,17 @@ pub enum StoreError {
 
 /// Parameters in a range of flash.
 pub struct ParameterStore<F: NorFlash> {
-    map: MapStorage<u8, F, NoCache>,
+    flash: F,
+    range: Range<u32>,
+}
+
+/// Map in a range of borrowed flash. Parameters and table have it of one type, so that its code is there once.
+pub(super) type Map<'f, F> = MapStorage<u8, &'f mut F, NoCache>;
+
+/// The map in `range` of `flash`.
+pub(super) fn map<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<Map<'_, F>, StoreError> {
+    let config = MapConfig::try_new(range).ok_or(StoreError::Flash)?;
+    Ok(MapStorage::new(flash, config, NoCache::new()))
 }
 
 impl<F: NorFlash> ParameterStore<F> {
@@ -40,9 +51,13 @@ impl<F: NorFlash> ParameterStore<F> {
     ///
     /// # Errors
     /// [`StoreError::Flash`] if the range does not fit the pages of the flash.
-    pub fn new(flash: F, range: Range<u32>) -> Result<Self, StoreError> {
-        let config = MapConfig::try_new(range).ok_or(StoreError::Flash)?;
-        Ok(Self { map: MapStorage::new(flash, config, NoCache::new()) })
+    pub fn new(mut flash: F, range: Range<u32>) -> Result<Self, StoreError> {
+        map(&mut flash, range.clone())?;
+        Ok(Self { flash, range })
+    }
+
+    fn map(&mut self) -> Result<Map<'_, F>, StoreError> {
+        map(&mut self.flash, self.range.clone())
     }
 
     /// The stored parameters; `None` if nothing was ever stored.
@@ -51,11 +66,12 @@ impl<F: NorFlash> ParameterStore<F> {
     /// [`StoreError`] if there is something and it cannot be used.
     pub async fn load(&mut self) -> Result<Option<Parameters>, StoreError> {
         let mut buffer = [0; BUFFER];
-        let record: Option<&[u8]> =
-            self.map.fetch_item(&mut buffer, &KEY).await.map_err(|_| StoreError::Flash)?;
+        let mut map = self.map()?;
+        let record: Option<&[u8]> = map.fetch_item(&mut buffer, &KEY).await.map_err(|_| StoreError::Flash)?;
         let Some(record) = record else {
             // Flash that was never written is all ones; anything else once was, or was to be, a set of parameters.
-            return if self.is_blank().await? { Ok(None) } else { Err(StoreError::Unusable) };
+            let blank = is_blank(&mut self.flash, self.range.clone()).await?;
+            return if blank { Ok(None) } else { Err(StoreError::Unusable) };
         };
         let (layout, values) = record.split_first_chunk::<4>().ok_or(StoreError::Unusable)?;
         if u32::from_le_bytes(*layout) != layout_hash() || record.len() != RECORD {
@@ -69,17 +85,12 @@ impl<F: NorFlash> ParameterStore<F> {
         Ok(Some(parameters))
     }
 
-    async fn is_blank(&mut self) -> Result<bool, StoreError> {
-        const STEP: usize = 64;
-        let range = self.map.flash_range();
-        let mut bytes = [0; STEP];
-        for offset in range.step_by(STEP) {
-            self.map.flash().read(offset, &mut bytes).await.map_err(|_| StoreError::Flash)?;
-            if bytes.iter().any(|byte| *byte != 0xff) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+    /// The ripple table's store in `range` of the same flash.
+    ///
+    /// # Errors
+    /// As [`TableStore::new`].
+    pub fn tables(&mut self, range: Range<u32>) -> Result<TableStore<'_, F>, StoreError> {
+        TableStore::new(&mut self.flash, range)
     }
 
     /// Stores `parameters`. A power cut at any moment leaves the set before or this one.
@@ -93,7 +104,7 @@ impl<F: NorFlash> ParameterStore<F> {
             *place = parameters.get(index as u16).unwrap_or(f32::NAN).to_le_bytes();
         }
         let mut buffer = [0; BUFFER];
-        self.map.store_item(&mut buffer, &KEY, &record.as_slice()).await.map_err(|_| StoreError::Flash)
+        self.map()?.store_item(&mut buffer, &KEY, &record.as_slice()).await.map_err(|_| StoreError::Flash)
     }
 
     /// Erases the store; the next load finds nothing.
@@ -101,8 +112,21 @@ impl<F: NorFlash> ParameterStore<F> {
     /// # Errors
     /// [`StoreError::Flash`] if the flash failed.
     pub async fn erase(&mut self) -> Result<(), StoreError> {
-        self.map.erase_all().await.map_err(|_| StoreError::Flash)
+        self.map()?.erase_all().await.map_err(|_| StoreError::Flash)
     }
+}
+
+/// Whether nothing was ever written to a range of flash.
+pub(super) async fn is_blank<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<bool, StoreError> {
+    const STEP: usize = 64;
+    let mut bytes = [0; STEP];
+    for offset in range.step_by(STEP) {
+        flash.read(offset, &mut bytes).await.map_err(|_| StoreError::Flash)?;
+        if bytes.iter().any(|byte| *byte != 0xff) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// FNV-1a over names and units in their order.

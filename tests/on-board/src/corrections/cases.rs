@@ -91,8 +91,13 @@ fn motor() -> Vec<Case> {
         breakaway_rad: BREAKAWAY_RAD,
     };
     let gear = GearLoadFriction { share: 0.3, breakaway_rad: BREAKAWAY_RAD };
-    let cogging =
-        MotorCogging { amplitude_nm: 0.2, cycles_per_turn: 14.0, phase_rad: 1.0, second_harmonic: 0.0 };
+    let cogging = MotorCogging {
+        amplitude_nm: 0.2,
+        cycles_per_turn: 14.0,
+        phase_rad: 1.0,
+        second_harmonic: 0.0,
+        third_harmonic: 0.0,
+    };
     let dead_zone = DriveDeadZone { width: 0.03 };
     let half = stribeck.stribeck_rad_per_s / LN_2.sqrt();
     vec![

@@ -1,6 +1,6 @@
 //! The emulated Cortex-M4F computes what this machine computes, bit for bit, and within its budget.
 
-use bowden_control::conformance::{compensator_digest, run};
+use bowden_control::conformance::{compensator_digest, correction_digest, ripple_table_digest, run};
 use bowden_on_board_tests::cost::ControlAlone;
 use bowden_on_board_tests::{Outcome, image};
 
@@ -10,6 +10,13 @@ fn the_core_computes_what_this_machine_computes() -> Outcome {
     assert!(found.inputs >= 1_000_000 && found.ticks >= 50_000, "{found:?}");
     assert_eq!(found.compensator, compensator_digest(found.seed, found.inputs), "{found:?}");
     assert_eq!(found.outcome, run(found.seed, found.ticks));
+    let ticks = found.corrected_ticks;
+    assert!(ticks >= 20_000, "{found:?}");
+    assert_eq!(
+        found.corrected,
+        [correction_digest(found.seed, ticks), ripple_table_digest(found.seed, ticks)],
+        "{found:?}"
+    );
     // All seven states were among them.
     assert_eq!(found.outcome.states, 0x7f);
     Ok(())

@@ -3,8 +3,12 @@
 use bowden_link::Fault;
 
 /// Sources of the tests that provoke faults.
-const SOURCES: [&str; 3] =
-    [include_str!("faults.rs"), include_str!("failures.rs"), include_str!("parameters.rs")];
+const SOURCES: [&str; 4] = [
+    include_str!("faults.rs"),
+    include_str!("failures.rs"),
+    include_str!("parameters.rs"),
+    include_str!("ripple_table.rs"),
+];
 
 /// The test that provokes `fault`.
 fn test_of(fault: Fault) -> &'static str {
@@ -25,6 +29,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::TickOverrun => "a_late_tick_is_a_fault",
         Fault::HostSilent => "a_host_that_falls_silent_stops_the_joint",
         Fault::ParameterStoreCorrupt => "a_broken_store_is_told_and_defaults_are_used",
+        Fault::RippleTableCorrupt => "a_damaged_table_is_told_and_the_motor_stays_off",
         Fault::Watchdog => "a_hang_ends_with_the_watchdog_and_the_motor_is_off_long_before",
         Fault::Panic => "a_panic_stops_the_motor_and_leaves_its_words",
         Fault::HardFault => "a_processor_fault_stops_the_motor_and_says_where",

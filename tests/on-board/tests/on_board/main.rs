@@ -14,6 +14,7 @@ mod load;
 mod modes;
 mod moved_sheath;
 mod parameters;
+mod ripple_table;
 mod stop;
 mod terminal;
 mod torque_mode;
