@@ -7,6 +7,7 @@
 //! | [`error`], [`losses`] | what goes wrong, and what gets lost |
 //! | [`parameters`] | the board's parameters by name, to and from a file |
 //! | [`from_rig`] | the board's parameters from what a fit or a diagnosis found |
+//! | [`ripple_table`] | the board's ripple table, to and from a file |
 //! | [`session`] | from off to a running reference and back to off |
 //! | [`course`] | what the joint is to follow |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
@@ -21,6 +22,7 @@ pub mod losses;
 pub mod parameters;
 pub mod recorder;
 pub mod rig_file;
+pub mod ripple_table;
 pub mod serial;
 pub mod session;
 pub mod sim;

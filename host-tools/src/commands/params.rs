@@ -1,5 +1,7 @@
 //! `bowden params`: the parameters of a board.
 
+mod table;
+
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -9,6 +11,7 @@ use crate::link::{Client, ParameterSet, PortArguments};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::rig::Rig;
+use table::TableArguments;
 
 /// Arguments of `bowden params`.
 #[derive(Clone, Debug, clap::Args)]
@@ -55,7 +58,9 @@ enum Action {
         #[arg(value_name = "FILE.toml")]
         file: PathBuf,
     },
-    /// Write the parameters to the board's flash
+    /// The table of the motor's torque ripple: show it, write it from a file, save it to one, or clear it
+    Table(TableArguments),
+    /// Write the parameters and the ripple table to the board's flash
     Store,
     /// Set all parameters to their defaults
     Default,
@@ -104,8 +109,10 @@ impl ParamsArguments {
     /// # Errors
     /// Exit status 2, if a name, value, file or the port is not usable; 1, if the board refused or the link broke.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        if let Some(Action::Save { file }) = &self.action {
-            output::check_file(file, &[])?;
+        match &self.action {
+            Some(Action::Save { file }) => output::check_file(file, &[])?,
+            Some(Action::Table(table)) => table.check()?,
+            _ => {}
         }
         let mut client = self.port.connect()?;
         let parameters = ParameterSet::read(&mut client)?;
@@ -128,6 +135,7 @@ impl ParamsArguments {
                 let text = parameters.to_toml();
                 output::write_file(file, |file| file.write_all(text.as_bytes()))?;
             }
+            Action::Table(table) => table.run(&mut client, &parameters)?,
             Action::Store => client.store_parameters()?,
             Action::Default => client.default_parameters()?,
         }

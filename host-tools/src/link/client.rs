@@ -11,9 +11,11 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::Duration;
 
+use bowden_control::correction::ripple_table::RippleTable;
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
 use bowden_link::message::{
-    Goal, Greeting, Parameter, Provocation, Reference, Refusal, STREAM_LENGTH, Status,
+    Goal, Greeting, Parameter, Provocation, Reference, Refusal, STREAM_LENGTH, Status, TABLE_CHUNK,
+    TableReport,
 };
 use bowden_link::{Answer, Batch, FromBoard, PROTOCOL_VERSION, Request, SCHEMA, Sample, State, ToBoard};
 
@@ -225,12 +227,55 @@ impl Client {
         self.order("the defaults", ToBoard::DefaultParameters)
     }
 
-    /// Writes the parameters to flash.
+    /// Writes the parameters and the ripple table to flash.
     ///
     /// # Errors
     /// [`Refusal::Storage`], [`Refusal::WrongState`] unless off, or no answer.
     pub fn store_parameters(&mut self) -> Result<(), LinkError> {
         self.order("to store the parameters", ToBoard::StoreParameters)
+    }
+
+    /// State of the ripple table.
+    ///
+    /// # Errors
+    /// No answer.
+    pub fn ripple_table(&mut self) -> Result<TableReport, LinkError> {
+        match self.request("the ripple table", ToBoard::ReadTable)? {
+            FromBoard::Table(report) => Ok(report),
+            _ => Err(self.other_answer("the ripple table", "ripple table").into()),
+        }
+    }
+
+    /// Points of the ripple table from an index on.
+    ///
+    /// # Errors
+    /// [`Refusal::NoSuchIndex`], or no answer.
+    pub fn ripple_points(&mut self, first: u16) -> Result<Vec<i16>, LinkError> {
+        match self.request("the ripple table", ToBoard::ReadTablePoints(first))? {
+            FromBoard::TablePoints(points_raw) => Ok(points_raw.as_slice().to_vec()),
+            _ => Err(self.other_answer("the ripple table", "part of it").into()),
+        }
+    }
+
+    /// Sends a ripple table, which acts when it is there as a whole.
+    ///
+    /// # Errors
+    /// [`Refusal::Moving`], [`Refusal::OutOfRange`], [`Refusal::TableDiffers`], or no answer; the table before is kept.
+    pub fn write_ripple_table(&mut self, table: &RippleTable) -> Result<(), LinkError> {
+        const REQUEST: &str = "the ripple table";
+        for (part, points_raw) in table.points_raw().chunks(TABLE_CHUNK).enumerate() {
+            let (first, points_raw) = ((part * TABLE_CHUNK) as u16, points_raw.iter().copied().collect());
+            self.order(REQUEST, ToBoard::WriteTablePoints { first, points_raw })?;
+        }
+        self.order(REQUEST, ToBoard::ActivateTable(table.head()))
+    }
+
+    /// Has the board forget its ripple table.
+    ///
+    /// # Errors
+    /// [`Refusal::Moving`], or no answer.
+    pub fn clear_ripple_table(&mut self) -> Result<(), LinkError> {
+        self.order("to clear the ripple table", ToBoard::ClearTable)
     }
 
     /// Asks for another state. It is entered with the next tick, or later: see [`Client::status`].

@@ -9,6 +9,7 @@ mod from_rig;
 mod mishaps;
 mod ports;
 mod pseudo_terminal;
+mod ripple_table;
 mod session;
 mod simulated;
 mod terminal;

@@ -128,6 +128,11 @@ pub(super) fn gear_load(active: &ActiveEffect, draft: &mut Draft, source: &str) 
 }
 
 pub(super) fn cogging(active: &ActiveEffect, draft: &mut Draft, source: &str) -> Result<(), String> {
+    if draft.value("correction.ripple_table.enable").unwrap_or(0.0) == 1.0 {
+        return Err("the ripple table acts in the place of harmonics; write a table that has this ripple in it, or set \
+                    correction.ripple_table.enable=0.0 first"
+            .to_owned());
+    }
     let [amplitude_nm, cycles_per_turn, phase_rad, ..] = active.parameters;
     let values = [
         ("correction.cogging.amplitude_1", amplitude_nm),
