@@ -61,6 +61,41 @@ fn parameters_are_listed_set_refused_and_stored() -> Outcome {
 }
 
 #[test]
+fn a_ripple_table_is_written_stored_saved_and_cleared() -> Outcome {
+    let scratch = Scratch::new("table");
+    let (file, saved) = (scratch.file("ripple.csv"), scratch.file("saved.csv"));
+    let rows = (0..40).map(|row| {
+        let angle_rad = 0.011 * f64::from(row);
+        format!("{angle_rad},{}", 0.2 * (14.0 * angle_rad).sin())
+    });
+    let lines: Vec<String> = std::iter::once("angle_rad,torque_nm".to_owned()).chain(rows).collect();
+    fs::write(&file, lines.join("\n")).expect("a file");
+    let mut board = plugged()?;
+    assert_eq!(good(board.run("params", &["table"])?)?, "no ripple table\n");
+    let written = good(board.run("params", &["table", &file, "--period", "0.4488"])?)?;
+    assert!(
+        written.starts_with("ripple table: 256 points over 0.448800 rad, 14.000 periods a turn"),
+        "{written}"
+    );
+    good(board.run("params", &["store"])?)?;
+    board.board.power_cycle()?;
+    board.board.run_until("device gone", |board| !board.usb_ready(), 0.1)?;
+    board.board.run_until("USB port", |board| board.usb_ready(), 1.0)?;
+    let shown = good(board.run("params", &["table"])?)?;
+    assert!(written.starts_with(&shown), "{shown} behind {written}");
+    // What is saved makes the same table again.
+    good(board.run("params", &["table", "--save", &saved])?)?;
+    let first =
+        fs::read_to_string(&saved).expect("the saved file").lines().next().unwrap_or_default().to_owned();
+    let period = first.split_whitespace().last().unwrap_or_default().to_owned();
+    let again = good(board.run("params", &["table", &saved, "--period", &period, "--dry-run"])?)?;
+    assert!(again.starts_with(&shown), "{again} behind {shown}");
+    good(board.run("params", &["table", "--clear"])?)?;
+    assert_eq!(good(board.run("params", &["table"])?)?, "no ripple table\n");
+    Ok(())
+}
+
+#[test]
 fn a_run_is_recorded_without_a_gap_and_a_fault_is_told_in_words() -> Outcome {
     let scratch = Scratch::new("record");
     let (recording, snapshot) = (scratch.file("run.csv"), scratch.file("snapshot.csv"));
