@@ -1,11 +1,14 @@
 //! Bad input on real processes: exit status, and one line that says file, place and what is wrong.
 
+mod common;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use common::bowden;
 use tempfile::TempDir;
 
 /// Samples of the recording that each case starts from.
@@ -91,13 +94,6 @@ fn gzip(data: &[u8]) -> Vec<u8> {
 }
 
 /// Runs `bowden` in a folder: exit status, standard output, standard error.
-fn bowden(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_bowden")).current_dir(folder).args(arguments).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
-}
-
 /// Exit status 2, nothing on standard output, and this one line.
 fn assert_refused(folder: &Path, arguments: &[&str], expected: &str) {
     let (status, stdout, stderr) = bowden(folder, arguments);

@@ -1,9 +1,9 @@
 //! A fit on recordings of the model itself, whose parameters are known: what comes back, and what cannot.
 
+mod common;
+
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
-use std::process::Command;
 
 use bowden::fit::identifiability::indistinguishable;
 use bowden::fit::objective::Objective;
@@ -16,6 +16,7 @@ use bowden::simulate::{Motion, Reference, RunOptions, run};
 use bowden::study::Study;
 use bowden_model::channel::Channel::{BusVoltage, Duty, ThetaIn};
 use bowden_model::parameters::nominal;
+use common::bowden;
 
 const RIG: &str = r#"schema = "bowden-rig/1"
 name = "bench"
@@ -125,13 +126,6 @@ fn a_joint_that_does_not_move_tells_nothing_on_friction() {
 }
 
 /// Runs `bowden` in a folder: exit status, standard output, standard error.
-fn bowden(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_bowden")).current_dir(folder).args(arguments).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
-}
-
 #[test]
 fn the_command_writes_a_rig_that_loads_and_says_what_is_unknown() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,7 +134,7 @@ fn the_command_writes_a_rig_that_loads_and_says_what_is_unknown() {
     let simulate = ["simulate", "--rig", "rig.toml", "--out", "rec.csv", "--seconds", "5"];
     assert_eq!(bowden(at, &simulate), (0, String::new(), String::new()));
     let (status, stdout, stderr) =
-        bowden(at, &["fit", "rec.csv", "--rig", "rig.toml", "--out", "fitted.toml", "--quiet"]);
+        bowden(at, &["fit", "rec.csv", "--rig", "rig.toml", "--out", "fitted.toml"]);
     assert_eq!((status, stderr.as_str()), (0, ""));
     assert!(stdout.contains("  sheath.friction_coefficient * sheath.wrap_angle_rad\n"), "{stdout}");
     let fitted = fs::read_to_string(at.join("fitted.toml")).unwrap();

@@ -1,8 +1,9 @@
 //! Studies: several benches and recordings fitted together, and what is refused.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use bowden::fit::recalibrate::recalibrate;
 use bowden::progress::Quiet;
@@ -10,6 +11,7 @@ use bowden::recording::{ReadOptions, Recording};
 use bowden::rig::{Assignment, Rig};
 use bowden::simulate::{Motion, Reference, RunOptions, run};
 use bowden::study::LoadedStudy;
+use common::bowden;
 
 /// What a bench really is, beside what its rig file states.
 struct Truth {
@@ -35,13 +37,6 @@ fn record(folder: &Path, truths: &[Truth]) {
         let recording: Recording = run(&rig, &reference, options).unwrap();
         recording.save(&folder.join(file)).unwrap();
     }
-}
-
-fn bowden(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output =
-        Command::new(env!("CARGO_BIN_EXE_bowden")).current_dir(folder).args(arguments).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
 }
 
 /// Two benches with pretensions of their own share the friction of their sheaths; a recording with another weight says so.
@@ -109,7 +104,7 @@ set = { "load.mass_kg" = 1.5 }
         |p: &&bowden::fit::recalibrate::FittedParameter| p.parameter.to_string() == "tendon.pretension_n";
     assert_eq!(result.parameters.iter().filter(shared).count(), 2, "every bench has its own, none is shared");
 
-    let (status, text, errors) = bowden(folder, &["fit", "study.toml", "--out", "fitted", "--quiet"]);
+    let (status, text, errors) = bowden(folder, &["fit", "study.toml", "--out", "fitted"]);
     assert_eq!((status, errors.as_str()), (0, ""), "{text}");
     for (bench, truth) in [("left", 26.0), ("right", 34.0)] {
         let written = Rig::load(&folder.join(format!("fitted/rig.fitted.{bench}.toml"))).unwrap();
