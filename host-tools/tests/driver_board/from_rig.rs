@@ -1,9 +1,11 @@
 //! Board parameters from a rig file: values by hand, all or nothing, and what the board cannot use.
 
 use std::fs;
+use std::time::Duration;
 
-use bowden::link::ParameterSet;
 use bowden::link::from_rig::{Transfer, Unused};
+use bowden::link::sim::SimTransport;
+use bowden::link::{Client, ParameterSet};
 use bowden::outcome::FailureClass;
 use bowden::rig::Rig;
 use bowden_link::ToBoard;
@@ -203,12 +205,31 @@ fn effects_become_corrections_of_the_board() {
          not used: effects.gear_load_friction: the board knows friction in proportion to the torque only, the exponent is 2\n\
          limited: correction.motor_friction.limit: 0.5 of 0.6750 act; raise it if the joint may have more\n\
          limited: correction.input_encoder.limit: 0.05 of 0.0625 act; raise it if the joint may have more\n\
+         limited: sheath.adapts: while it is 1 the board follows all friction of the sheaths as mu K, and correction.sheath does not \
+         act; where the sheaths do not move, params set sheath.adapts=0.0 lets it act\n\
          17 parameters would be set\n"
     ), "{stdout}");
     // The fake has no corrections.
     let (transfer, _) = transfer(&rig("\"joint_spring\"", ""), &[]);
     let reason = "this firmware has no parameter `correction.joint_spring.enable`".to_owned();
     assert_eq!(transfer.unused.last(), Some(&Unused { source: "effects.joint_spring".to_owned(), reason }));
+}
+
+#[test]
+fn friction_of_sheaths_is_limited_only_where_the_board_follows_it_by_itself() {
+    let limited = |effects: &str, adapts: f32| {
+        let mut client =
+            Client::connect(Box::new(SimTransport::new()), "sim", Duration::from_secs(1)).unwrap();
+        let parameters = ParameterSet::read(&mut client).unwrap();
+        let index = parameters.find("sheath.adapts").unwrap().index;
+        let parameters = parameters.with(&[(index, adapts)]);
+        let rig = Rig::parse(&rig(effects, ""), "rig.toml").unwrap();
+        let transfer = Transfer::new(&rig, "rig.toml", &parameters, &[]).unwrap();
+        transfer.limited.into_iter().map(|limit| limit.source).collect::<Vec<_>>()
+    };
+    assert_eq!(limited("\"sheath_viscous_friction\"", 1.0), ["sheath.adapts"]);
+    assert_eq!(limited("\"sheath_viscous_friction\"", 0.0), [""; 0]);
+    assert_eq!(limited("\"motor_cogging\"", 1.0), [""; 0]);
 }
 
 #[test]

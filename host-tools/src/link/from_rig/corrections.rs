@@ -1,7 +1,7 @@
 //! Effects that the board has a correction for, `correction.TERM.*`.
 //!
 //! The first effect of a term switches it on and takes back what the board had of it. Limits are the user's: they stay as they
-//! are, and [`limited`] says which of them a strength exceeds.
+//! are, and [`limited`] says which of them a strength exceeds. So does `sheath.adapts`: no rig states whether its sheaths move.
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Target};
@@ -79,7 +79,19 @@ pub(super) fn limited(draft: &Draft) -> Vec<Unused> {
             reason: format!("{allowed} of {:.4} act; raise it if the joint may have more", strength.abs()),
         })
     });
-    cut.collect()
+    cut.chain(followed(draft)).collect()
+}
+
+/// Why the term `sheath` does not act, if it was drafted and the board follows the friction of the sheaths by itself.
+fn followed(draft: &Draft) -> Option<Unused> {
+    const ADAPTS: &str = "sheath.adapts";
+    let follows = draft.has(SHEATH.enable) && draft.value(ADAPTS).is_ok_and(|adapts| adapts == 1.0);
+    follows.then(|| Unused {
+        source: ADAPTS.to_owned(),
+        reason: "while it is 1 the board follows all friction of the sheaths as mu K, and correction.sheath does not act; where \
+                 the sheaths do not move, params set sheath.adapts=0.0 lets it act"
+            .to_owned(),
+    })
 }
 
 impl Term {
