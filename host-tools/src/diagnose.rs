@@ -34,10 +34,10 @@ use crate::outcome::Failure;
 use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::rig::{Rig, RigDocument, RigParameter};
-use crate::study::Study;
+use crate::study::{Role, Study};
 use afterwards::afterwards;
-pub use experiment::Experiment;
-use experiment::Shown;
+use experiment::{Bearable, Shown};
+pub use experiment::{Experiment, SECONDS as EXPERIMENT_S};
 use layout::Layout;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use stages::{Stage, Stages};
@@ -110,16 +110,34 @@ impl Diagnosed {
     }
 }
 
+/// Whether the bench may be driven along a reference, `theta_ref_rad` over time.
+pub type Allowed<'a> = &'a (dyn Fn(&Recording) -> bool + Sync);
+
 /// Diagnoses the recordings of a study together, and proves the result on those that are held out; where none is, stretches of
 /// the others are. Effects that are tried on request only are tried if they are among `asked`.
 ///
 /// # Errors
 /// When there is no recording to learn from, one cannot drive its rig, or nothing can be compared.
 pub fn diagnose(study: &Study, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
+    diagnose_within(study, asked, &|_| true, progress)
+}
+
+/// As [`diagnose`], for a bench with limits: of the motions that separate hypotheses those within are preferred; one that is
+/// not allowed is named only where no allowed one separates them.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_within(
+    study: &Study,
+    asked: &[&str],
+    allowed: Allowed,
+    progress: &dyn Progress,
+) -> Result<Diagnosed, Failure> {
     let model = study.joint()?;
-    let training: Vec<&Recording> = study.recordings_where(false).collect();
-    let heldout: Vec<&Recording> = study.recordings_where(true).collect();
-    let objective = Objective::of(&model, study.observed(&model)?, heldout.is_empty())?;
+    let experiments: Vec<&Recording> = study.recordings_as(Role::Experiment).collect();
+    let training = study.recordings_as(Role::Training).chain(experiments.iter().copied()).collect();
+    let heldout = study.recordings_as(Role::HeldOut).collect();
+    let objective = Objective::of(&model, study.observed(&model)?)?;
     let benches: Result<Vec<(&String, Variation)>, Failure> = study
         .benches
         .iter()
@@ -130,10 +148,12 @@ pub fn diagnose(study: &Study, asked: &[&str], progress: &dyn Progress) -> Resul
         rig: &study.benches[0].rig,
         name: &study.name,
         training,
+        partly: experiments,
         heldout,
         objective: &objective,
         model: &model,
         benches: benches?,
+        allowed,
     };
     case.diagnosed(asked, progress)
 }
@@ -202,12 +222,16 @@ struct Case<'a> {
     /// Name in the report.
     name: &'a str,
     training: Vec<&'a Recording>,
+    /// Those of `training` of which stretches are held out although others are held out as a whole.
+    partly: Vec<&'a Recording>,
     heldout: Vec<&'a Recording>,
     objective: &'a Objective,
     /// The joint that all recordings share, as the first rig states it.
     model: &'a JointModel,
     /// Names of the benches, and what turns the shared joint into each.
     benches: Vec<(&'a String, Variation)>,
+    /// Where the motions that separate hypotheses may go.
+    allowed: Allowed<'a>,
 }
 
 fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
@@ -264,6 +288,7 @@ impl Case<'_> {
         let clock_s = objective.duration_s();
         let mut first_value = nominal.len();
         let shown = Shown::by(&training.iter().chain(heldout).copied().collect::<Vec<_>>());
+        let bearable = Bearable { shown, allowed: self.allowed, scales: objective.scales() };
         let mut experiments = Vec::new();
         let mut effects = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
@@ -271,7 +296,7 @@ impl Case<'_> {
             let count = active.descriptor().parameters.iter().filter(|spec| spec.searched).count();
             let values = first_value..first_value + count;
             let separate = |tried: &Tried| {
-                let found = experiment::separating(rig, chosen, tried, &shown, clock_s)?;
+                let found = experiment::separating(rig, chosen, tried, &bearable, clock_s)?;
                 let words = found.in_words();
                 experiments.push(found);
                 Some(words)
@@ -339,7 +364,9 @@ impl Case<'_> {
             heldout: if heldout.is_empty() {
                 vec!["every third second of each recording".to_owned()]
             } else {
-                heldout.iter().map(|r| r.source().to_owned()).collect()
+                let whole = heldout.iter().map(|recording| recording.source().to_owned());
+                let partly = self.partly.iter();
+                whole.chain(partly.map(|r| format!("every third second of {}", r.source()))).collect()
             },
             written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
         };

@@ -4,6 +4,7 @@ pub mod calibrated;
 pub mod free;
 pub mod identifiability;
 pub mod objective;
+pub mod observed;
 pub mod recalibrate;
 pub mod solver;
 pub mod typical;

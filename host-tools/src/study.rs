@@ -35,6 +35,18 @@ pub struct Bench {
     pub own: Vec<RigParameter>,
 }
 
+/// What a recording of a study is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// To learn from.
+    Training,
+    /// A motion on which hypotheses differ most: every third second judges, so that it decides between them, and the rest is learned
+    /// from, because it may show what no other recording does.
+    Experiment,
+    /// It judges the result and takes no other part.
+    HeldOut,
+}
+
 /// A recording of a study.
 #[derive(Clone, Debug)]
 pub struct StudyRecording {
@@ -42,8 +54,8 @@ pub struct StudyRecording {
     pub recording: Recording,
     /// Index into the benches.
     pub bench: usize,
-    /// Whether it judges the result and takes no other part.
-    pub heldout: bool,
+    /// What it is used for.
+    pub role: Role,
     /// What was different in this recording.
     pub set: Vec<Assignment>,
 }
@@ -52,17 +64,25 @@ impl Study {
     /// The study of one bench, with nothing different between its recordings.
     #[must_use]
     pub fn of_bench(rig: Rig, training: Vec<Recording>, heldout: Vec<Recording>) -> Self {
-        let listed =
-            |heldout| move |recording| StudyRecording { recording, bench: 0, heldout, set: Vec::new() };
-        let recordings =
-            training.into_iter().map(listed(false)).chain(heldout.into_iter().map(listed(true))).collect();
         let name = rig.name.clone();
-        Self { name: name.clone(), benches: vec![Bench { name, rig, own: Vec::new() }], recordings }
+        let bench = Bench { name: name.clone(), rig, own: Vec::new() };
+        Self { name, benches: vec![bench], recordings: Vec::new() }
+            .with(training, Role::Training)
+            .with(heldout, Role::HeldOut)
     }
 
-    /// The recordings that are held out, or those that are not.
-    pub fn recordings_where(&self, heldout: bool) -> impl Iterator<Item = &Recording> {
-        self.recordings.iter().filter(move |r| r.heldout == heldout).map(|r| &r.recording)
+    /// The study with more recordings of its first bench.
+    #[must_use]
+    pub fn with(mut self, recordings: Vec<Recording>, role: Role) -> Self {
+        let listed = |recording| StudyRecording { recording, bench: 0, role, set: Vec::new() };
+        self.recordings.extend(recordings.into_iter().map(listed));
+        self.recordings.sort_by_key(|recording| recording.role);
+        self
+    }
+
+    /// The recordings that are used so.
+    pub fn recordings_as(&self, role: Role) -> impl Iterator<Item = &Recording> {
+        self.recordings.iter().filter(move |listed| listed.role == role).map(|listed| &listed.recording)
     }
 }
 
@@ -121,12 +141,12 @@ impl LoadedStudy {
             recordings.push(StudyRecording {
                 recording: rig.load_recording(&listed.path)?,
                 bench: listed.bench,
-                heldout: listed.heldout,
+                role: if listed.heldout { Role::HeldOut } else { Role::Training },
                 set: listed.set,
             });
             files.push(listed.path);
         }
-        recordings.sort_by_key(|recording| recording.heldout);
+        recordings.sort_by_key(|recording| recording.role);
         Ok(Self { study: Study { name: file.name, benches, recordings }, documents, files })
     }
 

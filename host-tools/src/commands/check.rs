@@ -7,7 +7,7 @@ use super::{load_study, outcome_of, print};
 use crate::outcome::{Failure, Outcome};
 use crate::recording::{Column, ReadOptions, Recording};
 use crate::rig::Rig;
-use crate::study::{LoadedStudy, Study};
+use crate::study::{LoadedStudy, Role, Study};
 
 /// Arguments of `bowden check`.
 #[derive(Clone, Debug, clap::Args)]
@@ -89,7 +89,7 @@ fn describe_study(path: &Path, study: &Study) -> Result<String, Failure> {
         let _ = writeln!(text, "bench `{}`: rig `{}`, {own}", bench.name, bench.rig.name);
         for listed in study.recordings.iter().filter(|listed| listed.bench == index) {
             let _ = write!(text, "  {}", describe(&listed.recording));
-            if listed.heldout {
+            if listed.role == Role::HeldOut {
                 text.push_str("; held out");
             }
             for assignment in &listed.set {

@@ -7,16 +7,17 @@
 use bowden_model::channel::Channel;
 use rayon::prelude::*;
 
+use super::Allowed;
 use super::afterwards::afterwards;
 use super::selection::{Chosen, Tried};
-use crate::fit::objective::{Objective, Part};
+use crate::fit::objective::{Objective, Part, Series};
 use crate::joint_model::JointModel;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::simulate::{Reference, RunOptions, run};
 
 /// Length of an experiment, s.
-const SECONDS: f64 = 12.0;
+pub const SECONDS: f64 = 12.0;
 
 /// Samples a second of its reference.
 const RATE_HZ: f64 = 1000.0;
@@ -80,6 +81,17 @@ impl Shown {
         let within = |asked: f64, shown: f64| !asked.is_finite() || asked <= MARGIN * shown;
         within(asked.tension_n, self.tension_n) && within(asked.current_a, self.current_a)
     }
+}
+
+/// Motions that may be asked of a bench.
+pub(super) struct Bearable<'a> {
+    /// What it has been shown to bear: nothing beyond is asked.
+    pub shown: Shown,
+    /// What its user allows: preferred.
+    pub allowed: Allowed<'a>,
+    /// Scales of the recordings so far. A small motion would have small ones of its own, in which every difference is large;
+    /// the next diagnosis compares it together with the others.
+    pub scales: &'a [(Series, f64)],
 }
 
 /// A way to move between two angles.
@@ -170,17 +182,18 @@ impl Experiment {
     }
 }
 
-/// The motion on which the chosen effect and another one part most; `None` where no allowed motion parts them, or no
-/// forward run is possible.
+/// The motion on which the chosen effect and another one part most, an allowed one where one parts them; `None` where no
+/// bearable motion does, or no forward run is possible.
 pub(super) fn separating(
     rig: &Rig,
     chosen: &Chosen,
     rival: &Tried,
-    shown: &Shown,
+    bearable: &Bearable,
     clock_s: f64,
 ) -> Option<Experiment> {
     let own = rig.effects.len();
     let [named, other] = [&chosen.model, &rival.model].map(|model| afterwards(model, own, clock_s));
+    let Bearable { shown, allowed, scales } = bearable;
     let [low, high] = shown.angle_rad;
     let middle = 0.5 * (low + high);
     let bench = Rig { joint: named.parameters, effects: named.effects.clone(), ..rig.clone() };
@@ -194,21 +207,23 @@ pub(super) fn separating(
             let reference = course.reference(from, to);
             let followed = Reference::of_recording(&reference).ok()?;
             let run = run(&bench, &followed, options).ok().filter(|run| shown.allows(run))?;
-            let separation = loss(&other, &run)? - loss(&named, &run)?;
+            let separation = loss(&other, &run, scales)? - loss(&named, &run, scales)?;
             let [named, rival] = [&chosen.effect, &rival.effect].map(|effect| effect.descriptor().id);
             let file = format!("separate-{named}-from-{rival}.csv");
-            Some(Experiment { file, words: course.words(from, to), reference, separation })
+            let within = allowed(&reference);
+            Some((within, Experiment { file, words: course.words(from, to), reference, separation }))
         })
-        .filter(|experiment| experiment.separation > TELLING)
+        .filter(|(_, experiment)| experiment.separation > TELLING)
         // The first of equals, so that the number of threads does not matter.
-        .reduce_with(|a, b| if b.separation > a.separation { b } else { a })
+        .reduce_with(|a, b| if (b.0, b.1.separation) > (a.0, a.1.separation) { b } else { a })
+        .map(|(_, experiment)| experiment)
 }
 
-/// Mean loss of a replay of `run`.
-fn loss(model: &JointModel, run: &Recording) -> Option<f64> {
+/// Mean loss of a replay of `run`, in these scales.
+fn loss(model: &JointModel, run: &Recording, scales: &[(Series, f64)]) -> Option<f64> {
     let mut model = model.clone();
     model.inputs.retain(|channel| run.channel(*channel).is_some());
-    let objective = Objective::new(&model, std::slice::from_ref(run), &[], false).ok()?;
+    let objective = Objective::new(&model, std::slice::from_ref(run), &[], false).ok()?.in_scales(scales);
     let residuals = objective.residuals(&model).ok()?;
     let loss = objective.mean_loss(&residuals, Part::Training);
     loss.is_finite().then_some(loss)
@@ -256,6 +271,10 @@ mod tests {
     }
 
     fn parts(named: &str, rival: ActiveEffect, shown: &Shown) -> Option<Experiment> {
+        parts_within(named, rival, shown, &|_| true)
+    }
+
+    fn parts_within(named: &str, rival: ActiveEffect, shown: &Shown, allowed: Allowed) -> Option<Experiment> {
         let rig = test_bench::rig();
         let t_s: Vec<f64> = (0..100).map(|k| f64::from(k) * 1e-3).collect();
         let every =
@@ -268,7 +287,8 @@ mod tests {
         let with = |effect| (effect, JointModel { effects: vec![effect], ..model.clone() });
         let ((effect, named), (other, rival)) = (with(by_default(named)), with(rival));
         let chosen = Chosen { effect, model: named, loss_before: 2.0, loss_after: 1.0, others: Vec::new() };
-        separating(&rig, &chosen, &Tried { effect: other, model: rival, heldout_loss: 1.1 }, shown, 40.0)
+        let tried = Tried { effect: other, model: rival, heldout_loss: 1.1 };
+        separating(&rig, &chosen, &tried, &Bearable { shown: *shown, allowed, scales: &[] }, 40.0)
     }
 
     const ANYTHING: Shown =
@@ -281,6 +301,23 @@ mod tests {
         let found = parts("motor_viscous_friction", with_strength(none, 0.0), &ANYTHING).unwrap();
         assert_eq!(found.words, "a sine between -0.54 and 0.54 rad at 1 Hz");
         assert!(found.separation > 1.0, "{}", found.separation);
+    }
+
+    #[test]
+    fn a_motion_within_the_limits_is_preferred_and_the_best_one_named_where_none_is() {
+        let none = with_strength(by_default("motor_viscous_friction"), 0.0);
+        let slower_than = |most_rad_s: f64| {
+            move |reference: &Recording| {
+                let angles = reference.channel(Channel::ThetaRef).unwrap();
+                angles.windows(2).all(|w| (w[1] - w[0]).abs() * RATE_HZ < most_rad_s)
+            }
+        };
+        let found = |most_rad_s| {
+            parts_within("motor_viscous_friction", none, &ANYTHING, &slower_than(most_rad_s)).unwrap().words
+        };
+        // Of sines and triangles up to 1 rad/s the triangle at 0.8 rad/s has the largest mean square speed.
+        assert_eq!(found(1.0), "a triangle between -0.15 and 0.15 rad at 0.8 rad/s");
+        assert_eq!(found(0.0), "a sine between -0.54 and 0.54 rad at 1 Hz");
     }
 
     #[test]

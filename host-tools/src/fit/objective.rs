@@ -22,7 +22,7 @@ use bowden_model::channel::Channel;
 use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 
-use crate::fit::variation::Variation;
+use crate::fit::observed::{Observed, Use};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::reconstruct::quantum_of;
@@ -109,19 +109,6 @@ pub struct Objective {
     noise_variances: Vec<(Series, f64)>,
 }
 
-/// A recording and what it is used for.
-#[derive(Clone, Debug)]
-pub struct Observed<'r> {
-    /// The samples.
-    pub recording: &'r Recording,
-    /// Whether anything is fitted to it.
-    pub part: Part,
-    /// Index of the bench.
-    pub bench: usize,
-    /// What is different in it; `None` where its joint is the one that all share.
-    pub variation: Option<Variation>,
-}
-
 /// Residuals of every series and block, in scales.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Residuals {
@@ -150,17 +137,10 @@ impl Objective {
         heldout: &[Recording],
         split: bool,
     ) -> Result<Self, Failure> {
-        let observed: Vec<Observed> = training
-            .iter()
-            .map(|recording| Observed { recording, part: Part::Training, bench: 0, variation: None })
-            .chain(heldout.iter().map(|recording| Observed {
-                recording,
-                part: Part::HeldOut,
-                bench: 0,
-                variation: None,
-            }))
-            .collect();
-        Self::of(model, observed, split)
+        let part = if split { Use::Both } else { Use::Training };
+        let training = training.iter().map(|recording| Observed::alone(recording, part));
+        let heldout = heldout.iter().map(|recording| Observed::alone(recording, Use::HeldOut));
+        Self::of(model, training.chain(heldout).collect())
     }
 
     /// Prepares recordings of which each may differ from the joint that all share; those that are held out come last. The
@@ -168,11 +148,15 @@ impl Objective {
     ///
     /// # Errors
     /// When an input is missing, or nothing can be compared.
-    pub fn of(model: &JointModel, observed: Vec<Observed>, split: bool) -> Result<Self, Failure> {
+    pub fn of(model: &JointModel, observed: Vec<Observed>) -> Result<Self, Failure> {
         let mut datasets: Vec<Dataset> = Vec::new();
         let mut clocks_s: Vec<f64> = Vec::new();
-        for Observed { recording, part, bench, variation } in observed {
-            let split = split && part == Part::Training;
+        for Observed { recording, used_for, bench, variation } in observed {
+            let (part, split) = match used_for {
+                Use::Training => (Part::Training, false),
+                Use::Both => (Part::Training, true),
+                Use::HeldOut => (Part::HeldOut, false),
+            };
             let mut dataset = Dataset::new(model, recording, variation, part, split)?;
             clocks_s.resize(clocks_s.len().max(bench + 1), 0.0);
             dataset.input.continues_after(clocks_s[bench]);
@@ -208,6 +192,17 @@ impl Objective {
         let count = self.datasets.iter().take_while(|dataset| fitted(dataset)).count();
         let (fitted, judging) = self.datasets.split_at(count);
         [fitted, judging].map(|datasets| Self { datasets: datasets.to_vec(), ..self.clone() })
+    }
+
+    /// The same recordings, compared in the scales of others where these have the series.
+    #[must_use]
+    pub fn in_scales(mut self, scales: &[(Series, f64)]) -> Self {
+        for (series, scale) in &mut self.scales {
+            if let Some((_, other)) = scales.iter().find(|(other, _)| other == series) {
+                *scale = *other;
+            }
+        }
+        self
     }
 
     /// The same recordings with every sample used for fitting.

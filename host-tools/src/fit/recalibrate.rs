@@ -3,6 +3,7 @@
 use super::calibrated::{own_of_effect, recalibrated};
 use super::identifiability::{Group, Sensitivity};
 use super::objective::{Objective, Part, Series};
+use super::observed::Use;
 use super::solver::solve;
 use super::variation::Variation;
 use crate::joint_model::JointModel;
@@ -100,8 +101,11 @@ impl Recalibration {
 pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibration, Failure> {
     let model = &study.joint()?;
     let mut observed = study.observed(model)?;
-    observed.retain(|observed| observed.part == Part::Training);
-    let objective = &Objective::of(model, observed, false)?;
+    observed.retain(|observed| observed.used_for != Use::HeldOut);
+    for observed in &mut observed {
+        observed.used_for = Use::Training;
+    }
+    let objective = &Objective::of(model, observed)?;
     let benches: Result<Vec<Variation>, Failure> =
         (0..study.benches.len()).map(|bench| study.variation_of_bench(bench, model)).collect();
     let benches = benches?;

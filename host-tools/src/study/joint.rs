@@ -1,8 +1,8 @@
 //! The joint that the recordings of a study share, and what is different in each of them.
 
-use super::{Bench, Study, StudyRecording};
+use super::{Bench, Role, Study, StudyRecording};
 use crate::fit::calibrated::{CALIBRATED, Calibrated};
-use crate::fit::objective::{Observed, Part};
+use crate::fit::observed::{Observed, Use};
 use crate::fit::variation::Variation;
 use crate::joint_model::{JointModel, OwnParameter, OwnParameters};
 use crate::outcome::Failure;
@@ -17,7 +17,7 @@ impl Study {
     /// # Errors
     /// When there is no recording to learn from, or one lacks what drives the joint.
     pub fn joint(&self) -> Result<JointModel, Failure> {
-        if self.recordings_where(false).next().is_none() {
+        if self.recordings_as(Role::Training).next().is_none() {
             return Err(Failure::bad_input("no recording to learn from; name one that is not held out"));
         }
         let mut joint = self.joint_of(0)?;
@@ -37,11 +37,13 @@ impl Study {
         Ok(joint)
     }
 
-    /// The recordings with their differences from `joint`, that of [`Study::joint`]; held-out ones last.
+    /// The recordings with their differences from `joint`, that of [`Study::joint`]; held-out ones last. Where none is held out,
+    /// every third second of the others is.
     ///
     /// # Errors
     /// When a recording lacks what drives its joint.
     pub fn observed(&self, joint: &JointModel) -> Result<Vec<Observed<'_>>, Failure> {
+        let whole = self.recordings_as(Role::HeldOut).next().is_some();
         self.recordings
             .iter()
             .map(|listed| {
@@ -49,7 +51,11 @@ impl Study {
                     if self.is_plain(listed) { None } else { Some(self.variation(listed, joint)?) };
                 Ok(Observed {
                     recording: &listed.recording,
-                    part: if listed.heldout { Part::HeldOut } else { Part::Training },
+                    used_for: match listed.role {
+                        Role::Training if whole => Use::Training,
+                        Role::Training | Role::Experiment => Use::Both,
+                        Role::HeldOut => Use::HeldOut,
+                    },
                     bench: listed.bench,
                     variation,
                 })
