@@ -2,40 +2,44 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`plan`] | limits, and references within them |
+//! | [`limits`] | what the user asks for and the board allows |
+//! | [`plan`] | references within the limits |
+//! | [`demand`] | angle, speed and torque that a reference asks for |
 //! | [`driver`] | one run: pretension check, homing, reference, recording |
 //! | [`rounds`] | diagnosis, and the experiments that separate what is left |
 //! | [`changes`] | what the diagnosis changes on the board |
+//! | `correction` | sets it, and takes it back where the joint does not follow better |
 //! | [`verification`] | tracking error with the old and the new parameters |
 //! | [`report`] | `investigation.json` and `investigate.html` |
 
 pub mod changes;
+mod correction;
+pub mod demand;
 pub mod driver;
+pub mod limits;
 pub mod plan;
 pub mod report;
 pub mod rounds;
+#[cfg(test)]
+mod test_joint;
 pub mod verification;
 mod words;
 
 use std::path::{Path, PathBuf};
 
-use crate::commands::print;
-use crate::link::capture::save_parameters;
-use crate::link::course::Course;
-use crate::link::from_rig::Transfer;
+use crate::link::Client;
+use crate::link::course::{Course, Track};
 use crate::link::session::{Session, Stop};
-use crate::link::{Client, ParameterSet};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::progress::Progress;
-use crate::recording::{ReadOptions, Recording};
 use crate::rig::Rig;
-use changes::{Changes, State, follows_diagnosis};
+use changes::Correction;
 use driver::{Driver, Task};
-use plan::{Plan, Purpose, Run, Wishes};
+use limits::Wishes;
+use plan::{Plan, Purpose, Run};
 use report::Investigation;
 use rounds::{Asked, Case, Diagnosed, track_within};
-use verification::{Effect, Followed, JointEncoder, Motion, Verification};
 
 /// Parameters of the board before anything is set, in the folder of an investigation.
 pub const PARAMETERS_BEFORE: &str = "parameters.before.toml";
@@ -59,9 +63,15 @@ pub struct Setup<'s> {
     pub dry_run: bool,
 }
 
-/// Asks the user before something happens.
-pub trait Ask {
-    /// Whether it may happen.
+/// Shows the user what happens, and asks before it does.
+pub trait Dialog {
+    /// Shows a text.
+    ///
+    /// # Errors
+    /// When it cannot be shown.
+    fn show(&self, text: &str) -> Result<(), Failure>;
+
+    /// Whether something may happen.
     ///
     /// # Errors
     /// When nobody can be asked.
@@ -76,14 +86,14 @@ pub trait Ask {
 pub fn investigate(
     setup: &Setup,
     client: Client,
-    ask: &dyn Ask,
+    dialog: &dyn Dialog,
     stop: Stop,
     progress: &dyn Progress,
 ) -> Result<Outcome, Failure> {
     let rig = Rig::load(setup.rig)?;
     let session = Session::new(client)?;
     let plan = Plan::new(&session.parameters().control(), &setup.wishes)?;
-    print(&format!(
+    dialog.show(&format!(
         "board {}, rig {} ({})\n{}",
         session.parameters().board(),
         rig.name,
@@ -91,9 +101,9 @@ pub fn investigate(
         plan.table()
     ))?;
     if setup.dry_run {
-        return print("dry run: nothing was moved and nothing was written\n").map(|()| Outcome::done());
+        return dialog.show("dry run: nothing was moved and nothing was written\n").map(|()| Outcome::done());
     }
-    if !ask.may("Move the joint along these references?")? {
+    if !dialog.may("Move the joint along these references?")? {
         return Err(Failure::failed("not confirmed: nothing was moved and nothing was written"));
     }
     output::prepare_folder(setup.folder, &[], &[])?;
@@ -108,7 +118,8 @@ pub fn investigate(
         recorded: Vec::new(),
         notes: Vec::new(),
     };
-    let mut work = Work { setup, given: rig, driver, ask };
+    let mut work =
+        Work { setup, given: rig, driver, dialog, diagnose: &|case, progress| case.diagnose(progress) };
     let result = work.all(&mut account);
     // Whatever went wrong: a bridge that is off stays off.
     let off = work.driver.session.off();
@@ -126,28 +137,30 @@ pub fn investigate(
     }
     let page = account.save(setup.folder)?;
     off?;
-    print(&format!("{}\n{}\n", account.conclusion(), page.display()))?;
+    dialog.show(&format!("{}\n{}\n", account.conclusion(), page.display()))?;
     let mut outcome = Outcome::done();
     outcome.extend(work.driver.notes);
     Ok(outcome)
 }
+
+/// Diagnoses recordings: [`Case::diagnose`].
+type Diagnose<'d> = &'d dyn Fn(&Case, &dyn Progress) -> Result<Diagnosed, Failure>;
 
 /// An investigation under way.
 struct Work<'w> {
     setup: &'w Setup<'w>,
     given: Rig,
     driver: Driver<'w>,
-    ask: &'w dyn Ask,
+    dialog: &'w dyn Dialog,
+    diagnose: Diagnose<'w>,
 }
 
 impl Work<'_> {
     fn all(&mut self, account: &mut Investigation) -> Result<(), Failure> {
         let training = self.excite(&account.plan, Purpose::Training)?;
         let validation = self.excite(&account.plan, Purpose::Validation)?;
-        let found = self.rounds(account, training, &validation)?;
-        let diagnosed = follows_diagnosis(found.round.diagnosis.verdict);
-        let rig = if diagnosed { found.rig } else { self.given.clone() };
-        self.correct(account, &rig, diagnosed)
+        let found = self.rounds(account, &training, &validation)?;
+        self.correct(account, &Correction::of(found, &self.given))
     }
 
     /// Drives along all references for a purpose.
@@ -170,31 +183,28 @@ impl Work<'_> {
     fn rounds(
         &mut self,
         account: &mut Investigation,
-        mut training: Vec<PathBuf>,
+        training: &[PathBuf],
         validation: &[PathBuf],
     ) -> Result<Diagnosed, Failure> {
-        let first = self.diagnose(account, "diagnosis", &training, validation)?;
+        let first = self.diagnose(account, "diagnosis", training, &[], validation)?;
         let mut spare_s = account.plan.spare_s();
         let mut asked = Vec::new();
-        let mut done = 0;
+        let mut driven: Vec<(&str, PathBuf)> = Vec::new();
         for experiment in &first.experiments {
             let parameters = self.driver.session.parameters().control();
-            let track = track_within(experiment, &account.plan.limits, spare_s, &parameters);
-            let not_done = match track {
-                Err(reason) => Some(reason),
-                Ok(track) => {
-                    let seconds = track.duration_s();
-                    spare_s -= seconds;
-                    done += 1;
-                    let task = Task {
-                        name: &format!("experiment-{done}"),
-                        purpose: "experiment",
-                        reference: &experiment.words,
-                        course: &Course::Streamed(track),
-                        seconds,
-                    };
-                    training.push(self.driver.drive(&task)?);
-                    None
+            let limits = &account.plan.limits;
+            let not_done = if driven.iter().any(|(words, _)| *words == experiment.words.as_str()) {
+                // One motion may separate several pairs.
+                None
+            } else {
+                match track_within(&experiment.reference, limits, spare_s, &parameters) {
+                    Err(reason) => Some(reason),
+                    Ok(track) => {
+                        spare_s -= track.duration_s();
+                        let name = format!("experiment-{}", driven.len() + 1);
+                        driven.push((&experiment.words, self.experiment(&name, &experiment.words, track)?));
+                        None
+                    }
                 }
             };
             asked.push(Asked {
@@ -207,10 +217,17 @@ impl Work<'_> {
         if let Some(round) = account.rounds.last_mut() {
             round.experiments = asked;
         }
-        if done == 0 {
+        if driven.is_empty() {
             return Ok(first);
         }
-        self.diagnose(account, "diagnosis-2", &training, validation)
+        let recordings: Vec<PathBuf> = driven.into_iter().map(|(_, recording)| recording).collect();
+        self.diagnose(account, "diagnosis-2", training, &recordings, validation)
+    }
+
+    fn experiment(&mut self, name: &str, words: &str, track: Track) -> Result<PathBuf, Failure> {
+        let seconds = track.duration_s();
+        let course = &Course::Streamed(track);
+        self.driver.drive(&Task { name, purpose: "experiment", reference: words, course, seconds })
     }
 
     fn diagnose(
@@ -218,219 +235,130 @@ impl Work<'_> {
         account: &mut Investigation,
         name: &str,
         training: &[PathBuf],
+        experiments: &[PathBuf],
         heldout: &[PathBuf],
     ) -> Result<Diagnosed, Failure> {
-        let case = Case { rig: self.setup.rig, training, heldout, folder: self.setup.folder, name };
-        let found = case.diagnose(self.driver.progress)?;
+        let (limits, spare_s) = (account.plan.limits, account.plan.spare_s());
+        let parameters = self.driver.session.parameters().control();
+        let case = Case {
+            rig: self.setup.rig,
+            training,
+            experiments,
+            heldout,
+            folder: self.setup.folder,
+            name,
+            allowed: &|reference| track_within(reference, &limits, spare_s, &parameters).is_ok(),
+        };
+        let found = (self.diagnose)(&case, self.driver.progress)?;
         self.driver.notes.extend(found.notes.iter().cloned());
-        print(&format!("{}\n", found.findings.diagnosis.summary))?;
+        self.dialog.show(&format!("{}\n", found.findings.diagnosis.summary))?;
         account.rounds.push(found.round.clone());
         Ok(found)
     }
-
-    /// Sets what a rig changes on the board, and checks that the joint follows its reference no worse.
-    fn correct(&mut self, account: &mut Investigation, rig: &Rig, diagnosed: bool) -> Result<(), Failure> {
-        let old = self.driver.session.parameters().clone();
-        let transfer = Transfer::new(rig, &self.setup.rig.display().to_string(), &old, &[])?;
-        print(&transfer.table())?;
-        let changes = |state| Some(Changes::of(&transfer, diagnosed, state));
-        save_parameters(&self.setup.folder.join(PARAMETERS_BEFORE), &old)?;
-        let runs: Vec<Run> = account.plan.of(Purpose::Verification).cloned().collect();
-        let old_encoder = JointEncoder::of(&old)?;
-        if transfer.changes.is_empty() {
-            account.parameters = changes(State::Unchanged);
-            let before = self.follow(&runs, "before", &old_encoder, &old_encoder)?;
-            account.verification = Some(Verification::of(alone(runs, before)?));
-            return Ok(());
-        }
-        account.parameters = changes(State::Declined);
-        let question = format!("Set {} on the board?", words::parameters(transfer.changes.len()));
-        if !self.ask.may(&question)? {
-            return Ok(());
-        }
-        // The joint's encoder may be read otherwise with the new parameters: both runs are read as with these.
-        let new = old.with(&transfer.values());
-        let encoder = JointEncoder::of(&new)?;
-        let before = self.follow(&runs, "before", &old_encoder, &encoder)?;
-        self.driver.session.replace_parameters(&transfer.values())?;
-        save_parameters(&self.setup.folder.join(PARAMETERS_AFTER), &new)?;
-        account.parameters = changes(State::Set);
-        let after = match self.follow(&runs, "after", &encoder, &encoder) {
-            Ok(after) => after,
-            Err(failure) => {
-                // Off first: some parameters are refused while the joint moves.
-                let restored = self.driver.session.off().map_err(Failure::from);
-                return Err(match restored.and_then(|()| self.restore(&old, &new)) {
-                    Ok(()) => {
-                        account.parameters = changes(State::Restored);
-                        failure.with_note(&"the board has its old parameters again")
-                    }
-                    Err(other) => failure.with_note(&format!(
-                        "the old parameters could not be put back ({other}): load {PARAMETERS_BEFORE}"
-                    )),
-                });
-            }
-        };
-        let verification = Verification::of(together(runs, before, after)?);
-        let worse = verification.effect == Some(Effect::Worse);
-        account.verification = Some(verification);
-        if worse {
-            self.restore(&old, &new)?;
-            account.parameters = changes(State::Restored);
-        }
-        Ok(())
-    }
-
-    /// Sets every parameter that differs back to its old value.
-    fn restore(&mut self, old: &ParameterSet, new: &ParameterSet) -> Result<(), Failure> {
-        let values: Vec<(u16, f32)> = old
-            .all()
-            .iter()
-            .zip(new.all())
-            .filter(|(old, new)| old.value != new.value)
-            .map(|(old, _)| (old.index, old.value))
-            .collect();
-        self.driver.session.replace_parameters(&values)
-    }
-
-    /// Drives along references; the angle of the joint is the one behind what its encoder shows.
-    fn follow(
-        &mut self,
-        runs: &[Run],
-        when: &str,
-        recorded: &JointEncoder,
-        encoder: &JointEncoder,
-    ) -> Result<Vec<Motion>, Failure> {
-        let mut motions = Vec::new();
-        for (index, run) in runs.iter().enumerate() {
-            let name = format!("verify-{}-{}-{when}", index + 1, run.form);
-            let path = self.drive(&name, &format!("verify, {when}"), run)?;
-            let recording = Recording::load(&path, &ReadOptions::default())?;
-            motions.push(encoder.motion(recorded, &recording)?);
-        }
-        Ok(motions)
-    }
-}
-
-fn alone(runs: Vec<Run>, before: Vec<Motion>) -> Result<Vec<Followed>, Failure> {
-    let followed = runs.into_iter().zip(before).map(|(run, motion)| {
-        Ok(Followed { run, before: motion.error()?, after: None, traces: vec![motion] })
-    });
-    followed.collect()
-}
-
-fn together(runs: Vec<Run>, before: Vec<Motion>, after: Vec<Motion>) -> Result<Vec<Followed>, Failure> {
-    let followed = runs.into_iter().zip(before).zip(after).map(|((run, before), after)| {
-        let errors = (before.error()?, after.error()?);
-        Ok(Followed { run, before: errors.0, after: Some(errors.1), traces: vec![before, after] })
-    });
-    followed.collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::cell::RefCell;
+    use std::f64::consts::TAU;
 
+    use bowden_model::channel::Channel;
+
+    use super::limits::Wishes;
+    use super::rounds::{Round, Summary};
+    use super::test_joint::{rig, with_work};
     use super::*;
-    use crate::link::sim::SimTransport;
-    use crate::progress::Quiet;
+    use crate::diagnose::Experiment;
+    use crate::diagnose::verdict::Rival;
+    use crate::recording::{ReadOptions, Recording};
+    use crate::report::example;
 
-    struct Answers(bool);
-
-    impl Ask for Answers {
-        fn may(&self, _question: &str) -> Result<bool, Failure> {
-            Ok(self.0)
+    /// A diagnosis that names `id`, and rivals which a motion of this amplitude separates from it.
+    fn found(id: &str, rivals: &[&str], amplitude_rad: f64) -> Diagnosed {
+        let mut findings = example::findings(100);
+        let diagnosis = &mut findings.diagnosis;
+        diagnosis.unexplained = None;
+        diagnosis.effects.truncate(1);
+        diagnosis.effects[0].id = id.to_owned();
+        diagnosis.effects[0].rivals.clear();
+        let mut experiments = Vec::new();
+        for rival in rivals {
+            let words = "a slow sine".to_owned();
+            diagnosis.effects[0].rivals.push(Rival {
+                id: (*rival).to_owned(),
+                probability: 0.4,
+                separating_experiment: words.clone(),
+            });
+            let t_s: Vec<f64> = (0..4000).map(|k| f64::from(k) * 1e-3).collect();
+            let angles = t_s.iter().map(|t_s| amplitude_rad * (TAU * 0.25 * t_s).sin()).collect();
+            let reference = Recording::new("experiment", t_s).with(Channel::ThetaRef, angles);
+            let file = format!("separate-{id}-from-{rival}.csv");
+            experiments.push(Experiment { file, words, reference, separation: 0.7 });
         }
-    }
-
-    /// The bench of the data sheet with `effects`, text of the rig format, that it does not have.
-    fn rig(pretension_n: f64, effects: &str) -> Rig {
-        let nominal = virtual_bench::nominal_rig_toml("bench");
-        let text = nominal
-            .replace("pretension_n = 30", &format!("pretension_n = {pretension_n}"))
-            .replace("effects = []", effects);
-        Rig::parse(&text, "rig.toml").unwrap()
-    }
-
-    /// Corrects the simulated joint, which conceals nothing, by a rig; returns the account, the result, and which parameters
-    /// differ afterwards.
-    fn correct(rig: &Rig, answer: bool) -> (Investigation, Result<(), Failure>, Vec<String>) {
-        let folder = tempfile::tempdir().unwrap();
-        let client = Client::connect(Box::new(SimTransport::new()), "sim", Duration::from_secs(1)).unwrap();
-        let session = Session::new(client).unwrap();
-        let old = session.parameters().clone();
-        let plan = Plan::new(&old.control(), &Wishes::shortest()).unwrap();
-        let mut account = Investigation::new(&rig.name, &old, plan);
-        let setup = Setup {
-            rig: Path::new("rig.toml"),
-            folder: folder.path(),
-            wishes: Wishes::shortest(),
-            ending: "csv",
-            every: 10,
-            dry_run: false,
+        let round = Round {
+            folder: String::new(),
+            recordings: Vec::new(),
+            partly_heldout: Vec::new(),
+            heldout: Vec::new(),
+            diagnosis: Summary::from(&findings.diagnosis),
+            experiments: Vec::new(),
         };
-        let driver = Driver {
-            session,
-            folder: folder.path(),
-            ending: "csv",
-            every: 10,
-            stop: &|| false,
-            progress: &Quiet,
-            recorded: Vec::new(),
-            notes: Vec::new(),
+        Diagnosed { round, rig: rig(30.0, "effects = []"), experiments, findings, notes: Vec::new() }
+    }
+
+    /// Rounds whose first diagnosis leaves two rivals, and whose second one decides for the first of them. Returns the account, the effect that
+    /// was found last, and the recordings of experiments that each diagnosis was given.
+    fn rounds(amplitude_rad: f64) -> (Investigation, String, Vec<Vec<Recording>>) {
+        let given = RefCell::new(Vec::new());
+        let diagnose = |case: &Case, _: &dyn Progress| {
+            let load = |path: &PathBuf| Recording::load(path, &ReadOptions::default()).unwrap();
+            assert_eq!((case.training, case.heldout), (&["train".into()][..], &["validate".into()][..]));
+            given.borrow_mut().push(case.experiments.iter().map(load).collect());
+            Ok(if case.experiments.is_empty() {
+                found("payload_change", &["joint_spring", "sensor_offset"], amplitude_rad)
+            } else {
+                found("joint_spring", &[], amplitude_rad)
+            })
         };
-        let mut work = Work { setup: &setup, given: rig.clone(), driver, ask: &Answers(answer) };
-        let result = work.correct(&mut account, rig, true);
-        let now = ParameterSet::read(work.driver.session.client()).unwrap();
-        let changed = old.all().iter().zip(now.all()).filter(|(old, now)| old.value != now.value);
-        (account, result, changed.map(|(old, _)| old.name.as_str().to_owned()).collect())
-    }
-
-    fn state(account: &Investigation) -> State {
-        account.parameters.as_ref().unwrap().state
+        let (account, id) = with_work(Wishes::default(), true, &diagnose, |work, account| {
+            let last = work.rounds(account, &["train".into()], &["validate".into()]).unwrap();
+            account.recordings.clone_from(&work.driver.recorded);
+            (account.clone(), last.findings.diagnosis.effects[0].id.clone())
+        });
+        (account, id, given.into_inner())
     }
 
     #[test]
-    fn parameters_with_which_the_joint_follows_worse_are_taken_back() {
-        let cogging = "effects = [\"motor_cogging\"]\n[effects.motor_cogging]\namplitude_nm = 0.25\n\
-                       cycles_per_turn = 9.0\nphase_rad = 0.5\n";
-        let (account, result, changed) = correct(&rig(30.0, cogging), true);
-        assert_eq!(result, Ok(()));
-        let verification = account.verification.as_ref().unwrap();
-        assert_eq!(verification.effect, Some(Effect::Worse), "{}", verification.in_words());
-        assert_eq!((state(&account), changed), (State::Restored, Vec::new()));
-        assert!(account.conclusion().starts_with("The joint followed worse"), "{}", account.conclusion());
+    fn an_experiment_that_separates_two_hypotheses_is_driven_and_decides() {
+        let (account, id, given) = rounds(0.2);
+        assert_eq!(id, "joint_spring");
+        let asked: Vec<_> = account.rounds.iter().flat_map(|round| &round.experiments).collect();
+        assert_eq!((account.rounds.len(), asked.len()), (2, 2));
+        assert!(asked.iter().all(|asked| asked.not_done.is_none()), "{asked:?}");
+        assert_eq!(asked[0].file, "separate-payload_change-from-joint_spring.csv");
+        // The motion that separates both is driven once.
+        let [recorded] = &account.recordings[..] else { panic!("{:?}", account.recordings) };
+        assert_eq!((recorded.file.as_str(), recorded.complete), ("experiment-1.csv", true));
+        // The second diagnosis is given what the joint did along the reference.
+        let [before, after] = &given[..] else { panic!("{} diagnoses", given.len()) };
+        assert_eq!((before.len(), after.len()), (0, 1));
+        let recording = &after[0];
+        let start_s = recording.t_s()[0];
+        let [reference, joint] =
+            [Channel::ThetaRef, Channel::ThetaOut].map(|channel| recording.channel(channel).unwrap());
+        let seen = recording.t_s().iter().zip(joint).filter(|(t_s, _)| **t_s - start_s > 1.0);
+        let (low, high) = seen.fold((0.0_f64, 0.0_f64), |(l, h), (_, v)| (l.min(*v), h.max(*v)));
+        assert!((-0.22..-0.18).contains(&low) && (0.18..0.22).contains(&high), "{low} to {high} rad");
+        let largest = reference.iter().fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
+        assert!((largest - 0.2).abs() < 0.01, "{largest} rad");
     }
 
     #[test]
-    fn parameters_with_which_the_joint_cannot_run_are_taken_back() {
-        // The pretension check finds 30 N where the new parameters say 50 N.
-        let (account, result, changed) = correct(&rig(50.0, "effects = []"), true);
-        let failure = result.unwrap_err();
-        assert!(
-            failure.message().contains("fault ") && failure.message().ends_with("its old parameters again"),
-            "{failure}"
-        );
-        assert_eq!((state(&account), changed), (State::Restored, Vec::new()));
-        assert_eq!(account.verification, None);
-    }
-
-    #[test]
-    fn declined_parameters_are_not_set() {
-        let (account, result, changed) = correct(&rig(33.0, "effects = []"), false);
-        assert_eq!((result, state(&account), changed), (Ok(()), State::Declined, Vec::new()));
-        let parameters = account.parameters.unwrap();
-        assert_eq!(
-            (parameters.changes[0].parameter.as_str(), parameters.changes[0].new),
-            ("tendon.pretension", 33.0)
-        );
-    }
-
-    #[test]
-    fn a_rig_that_agrees_with_the_board_leaves_it_as_it_is() {
-        let (account, result, changed) = correct(&rig(30.0, "effects = []"), true);
-        assert_eq!((result, state(&account), changed), (Ok(()), State::Unchanged, Vec::new()));
-        let verification = account.verification.unwrap();
-        assert!(verification.effect.is_none() && verification.before_rms_rad > 0.0);
+    fn an_experiment_beyond_the_limits_is_not_driven_and_the_first_diagnosis_counts() {
+        let (account, id, given) = rounds(1.5);
+        assert_eq!((id.as_str(), account.rounds.len(), given.len()), ("payload_change", 1, 1));
+        let reason = account.rounds[0].experiments[0].not_done.as_ref().unwrap();
+        assert!(reason.starts_with("it goes to "), "{reason}");
+        assert_eq!(account.recordings, []);
     }
 }

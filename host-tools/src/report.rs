@@ -8,6 +8,7 @@
 mod axis;
 mod envelope;
 mod figures;
+pub mod files;
 mod free_form;
 mod investigation;
 mod map;
@@ -20,7 +21,7 @@ mod proof;
 mod style;
 
 #[cfg(test)]
-mod example;
+pub(crate) mod example;
 #[cfg(test)]
 mod tests;
 

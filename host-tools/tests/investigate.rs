@@ -1,20 +1,22 @@
 //! `bowden investigate` from end to end on the simulated board, whose joint is the virtual bench; in virtual time.
 
+mod common;
+
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::rc::Rc;
 use std::time::Duration;
 
-use bowden::investigate::plan::Wishes;
-use bowden::investigate::{Ask, Setup, investigate};
+use bowden::investigate::limits::Wishes;
+use bowden::investigate::{Dialog, Setup, investigate};
 use bowden::link::sim::SimTransport;
 use bowden::link::{Client, Transport};
 use bowden::outcome::Failure;
 use bowden::progress::Quiet;
+use common::bowden;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -27,15 +29,8 @@ fn folder() -> TempDir {
 
 /// Runs `bowden investigate` without a terminal: exit status, standard output, standard error.
 fn run(folder: &Path, port: &str, more: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_bowden"))
-        .current_dir(folder)
-        .args(["--quiet", "investigate", "--port", port, "--rig", "rig.toml", "--out", "out"])
-        .args(more)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (output.status.code().expect("no signal"), text(&output.stdout), text(&output.stderr))
+    let investigate = ["investigate", "--port", port, "--rig", "rig.toml", "--out", "out"];
+    bowden(folder, &[&investigate, more].concat())
 }
 
 fn result(folder: &Path) -> Value {
@@ -205,7 +200,11 @@ impl Transport for Cut {
 /// Counts the questions and says yes.
 struct Agrees(Rc<Cell<u32>>);
 
-impl Ask for Agrees {
+impl Dialog for Agrees {
+    fn show(&self, _text: &str) -> Result<(), Failure> {
+        Ok(())
+    }
+
     fn may(&self, _question: &str) -> Result<bool, Failure> {
         self.0.set(self.0.get() + 1);
         Ok(true)

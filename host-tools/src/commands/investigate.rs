@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use super::print;
 use crate::interrupt;
-use crate::investigate::plan::Wishes;
-use crate::investigate::{Ask, Setup, investigate};
+use crate::investigate::limits::Wishes;
+use crate::investigate::{Dialog, Setup, investigate};
 use crate::link::PortArguments;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
@@ -55,7 +55,11 @@ pub struct InvestigateArguments {
 /// Says yes to everything.
 struct Yes;
 
-impl Ask for Yes {
+impl Dialog for Yes {
+    fn show(&self, text: &str) -> Result<(), Failure> {
+        print(text)
+    }
+
     fn may(&self, _question: &str) -> Result<bool, Failure> {
         Ok(true)
     }
@@ -64,9 +68,13 @@ impl Ask for Yes {
 /// Asks the person at the terminal.
 struct AtTerminal;
 
-impl Ask for AtTerminal {
+impl Dialog for AtTerminal {
+    fn show(&self, text: &str) -> Result<(), Failure> {
+        print(text)
+    }
+
     fn may(&self, question: &str) -> Result<bool, Failure> {
-        print(&format!("{question} [y/N] "))?;
+        self.show(&format!("{question} [y/N] "))?;
         // Reading a line cannot be interrupted, so another thread does it and this one looks for Ctrl-C.
         let (sender, answer) = mpsc::channel();
         std::thread::spawn(move || {
@@ -76,7 +84,7 @@ impl Ask for AtTerminal {
         });
         loop {
             if interrupt::requested() {
-                print("\n")?;
+                self.show("\n")?;
                 return Err(Failure::failed("stopped by the user"));
             }
             match answer.recv_timeout(LOOK_INTERVAL) {
@@ -100,7 +108,7 @@ impl InvestigateArguments {
     /// # Errors
     /// As [`investigate`]; also exit status 2 if nobody can be asked, or the folder holds something.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
-        let ask: &dyn Ask = if self.yes || self.dry_run { &Yes } else { &AtTerminal };
+        let dialog: &dyn Dialog = if self.yes || self.dry_run { &Yes } else { &AtTerminal };
         if !self.yes && !self.dry_run && !io::stdin().is_terminal() {
             return Err(Failure::bad_input(
                 "investigate moves the joint, and there is no terminal to ask at; nothing was moved; say --yes, or --dry-run to \
@@ -120,7 +128,7 @@ impl InvestigateArguments {
             every: self.every,
             dry_run: self.dry_run,
         };
-        investigate(&setup, client, ask, &interrupt::requested, &UntilInterrupted(progress))
+        investigate(&setup, client, dialog, &interrupt::requested, &UntilInterrupted(progress))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What an investigation asks of the joint: its limits, and references that stay within them.
+//! References of an investigation, within its limits.
 
 use std::fmt::Write;
 
@@ -7,18 +7,10 @@ use bowden_control::reference::oscillator::{ONE, form};
 use bowden_link::message::{Mode, Reference, Shape};
 use serde::Serialize;
 
+use super::demand::{Demand, demand_of};
+use super::limits::{Limits, Wishes};
 use super::words;
 use crate::outcome::Failure;
-
-/// Part of the angle at which the joint can stand that is used where the user names no angle.
-const ANGLE_SHARE: f32 = 0.6;
-
-/// Part of the largest speed that is used where the user names none: a joint with play or friction that nobody knows of swings
-/// more on its tendons than the board expects.
-const SPEED_SHARE: f32 = 0.5;
-
-/// Time that the joint is driven where the user names none, s.
-pub const DEFAULT_TIME_S: f64 = 120.0;
 
 /// Smallest amplitude that is worth a recording, rad: twenty counts of an encoder.
 const LEAST_AMPLITUDE_RAD: f32 = 0.03;
@@ -26,63 +18,11 @@ const LEAST_AMPLITUDE_RAD: f32 = 0.03;
 /// Part of the planned lengths of what is diagnosed below which a plan is not worth anything.
 const LEAST_SCALE: f64 = 0.3;
 
-/// Length of an experiment that separates two hypotheses, s, for which time is set aside.
-pub const EXPERIMENT_S: f64 = 12.0;
+/// Length of an experiment that separates two hypotheses, s.
+const EXPERIMENT_S: f64 = crate::diagnose::EXPERIMENT_S;
 
 /// Points of a period at which a reference is looked at.
 const POINTS: u32 = 2048;
-
-/// Limits that the user sets; where there is none, the board's count.
-#[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
-pub struct Wishes {
-    /// Largest angle of the joint, rad [default: 0.6 of what the board allows]
-    #[arg(long, value_name = "RAD", value_parser = positive)]
-    angle: Option<f64>,
-    /// Largest torque at the joint that a reference may ask for, N·m [default: what the board allows]
-    #[arg(long, value_name = "NM", value_parser = positive)]
-    torque: Option<f64>,
-    /// Largest speed of the joint that a reference may ask for, rad/s [default: 0.5 of what the board allows]
-    #[arg(long, value_name = "RAD/S", value_parser = positive)]
-    speed: Option<f64>,
-    /// Longest time that the joint is driven along references, all runs together, s; the runs are shortened to it
-    #[arg(long, value_name = "S", default_value_t = DEFAULT_TIME_S, value_parser = positive)]
-    time: f64,
-}
-
-impl Default for Wishes {
-    /// The board's limits.
-    fn default() -> Self {
-        Self { angle: None, torque: None, speed: None, time: DEFAULT_TIME_S }
-    }
-}
-
-#[cfg(test)]
-impl Wishes {
-    /// The shortest investigation there is.
-    pub(super) fn shortest() -> Self {
-        Self { time: 42.0, ..Self::default() }
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value <= 1e6 => Ok(value),
-        _ => Err("expected a number above 0".to_owned()),
-    }
-}
-
-/// What no reference of an investigation exceeds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Limits {
-    /// Angles of the joint, rad.
-    pub angle_rad: [f64; 2],
-    /// Torque at the joint, N·m.
-    pub torque_nm: f64,
-    /// Speed of the joint, rad/s.
-    pub speed_rad_s: f64,
-    /// Time that the joint is driven along references, s.
-    pub time_s: f64,
-}
 
 /// What a run is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -105,17 +45,6 @@ impl Purpose {
             Self::Verification => "verify",
         }
     }
-}
-
-/// Largest values that a reference asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Demand {
-    /// Angle, rad.
-    pub angle_rad: f64,
-    /// Speed, rad/s; corners as the board shapes them.
-    pub speed_rad_s: f64,
-    /// Torque at the joint: gravity and inertia of the load, N·m.
-    pub torque_nm: f64,
 }
 
 /// One run.
@@ -203,6 +132,15 @@ const WANTED: [Wanted; 7] = [
     wanted(Purpose::Verification, MULTISINE, 0.7, 1.0, 8.0),
 ];
 
+/// Time of all runs that are diagnosed, and of both verifications, where nothing is shortened, s.
+fn full_length_s() -> (f64, f64) {
+    let seconds = |verification: bool| -> f64 {
+        let runs = WANTED.iter().filter(|run| (run.purpose == Purpose::Verification) == verification);
+        runs.map(|run| run.seconds).sum()
+    };
+    (seconds(false), 2.0 * seconds(true))
+}
+
 impl Plan {
     /// Chooses references that a joint of these parameters can do within the limits.
     ///
@@ -210,24 +148,9 @@ impl Plan {
     /// Exit status 2 if the limits leave no room: which one, and what would do.
     pub fn new(parameters: &Parameters, wishes: &Wishes) -> Result<Self, Failure> {
         let reach = Reach::new(parameters);
-        let bound = |wish: Option<f64>, most: f32, share: f32| {
-            wish.map_or(f64::from(share * most), |wish| wish.min(f64::from(most)))
-        };
-        let limits = Limits {
-            angle_rad: [
-                -bound(wishes.angle, -reach.angle[0], ANGLE_SHARE),
-                bound(wishes.angle, reach.angle[1], ANGLE_SHARE),
-            ],
-            torque_nm: bound(wishes.torque, reach.torque, 1.0),
-            speed_rad_s: bound(wishes.speed, reach.speed, SPEED_SHARE),
-            time_s: wishes.time,
-        };
+        let limits = Limits::new(wishes, &reach);
         // Only what is diagnosed is shortened: a faster verification would show other errors.
-        let seconds = |verification: bool| -> f64 {
-            let runs = WANTED.iter().filter(|run| (run.purpose == Purpose::Verification) == verification);
-            runs.map(|run| run.seconds).sum()
-        };
-        let (diagnosed_s, verified_s) = (seconds(false), 2.0 * seconds(true));
+        let (diagnosed_s, verified_s) = full_length_s();
         let scale = ((limits.time_s - verified_s) / diagnosed_s).min(1.0);
         if scale < LEAST_SCALE {
             return Err(Failure::bad_input(format!(
@@ -337,12 +260,18 @@ impl Plan {
         for left_out in &self.left_out {
             let _ = writeln!(text, "left out: {left_out}");
         }
-        let _ = writeln!(
-            text,
-            "{:.0} s in all, the verification twice; {:.0} s are left for experiments that separate hypotheses",
-            self.seconds(),
-            self.spare_s().max(0.0)
-        );
+        let (seconds, spare_s) = (self.seconds(), self.spare_s().max(0.0));
+        let _ = write!(text, "{seconds:.0} s in all, the verification twice; ");
+        let _ = if spare_s < EXPERIMENT_S {
+            let (diagnosed_s, verified_s) = full_length_s();
+            let enough_s = diagnosed_s + verified_s + EXPERIMENT_S;
+            writeln!(
+                text,
+                "no time for an experiment that separates hypotheses, which takes {EXPERIMENT_S:.0} s: --time {enough_s:.0} leaves it"
+            )
+        } else {
+            writeln!(text, "{spare_s:.0} s are left for experiments that separate hypotheses")
+        };
         text
     }
 }
@@ -358,28 +287,11 @@ fn demand(run: &Run, parameters: &Parameters, reach: &Reach) -> Demand {
     demand_of(&angles, 1.0 / (f64::from(run.frequency_hz) * f64::from(POINTS)), parameters, reach)
 }
 
-/// What angles in equal steps of time ask for. Corners are as steep as the board makes them.
-pub fn demand_of(angles: &[f64], step_s: f64, parameters: &Parameters, reach: &Reach) -> Demand {
-    let load = &parameters.load;
-    let inertia = f64::from(load.mass * load.arm * load.arm + load.inertia);
-    let most = f64::from(reach.acceleration);
-    let mut demand = Demand { angle_rad: 0.0, speed_rad_s: 0.0, torque_nm: 0.0 };
-    for window in angles.windows(3) {
-        let &[before, angle, after] = window else { continue };
-        let speed = (0.5 * (after - before) / step_s).abs();
-        let acceleration = ((after - 2.0 * angle + before) / (step_s * step_s)).clamp(-most, most);
-        let torque = inertia * acceleration + f64::from(reach.weight) * angle.sin();
-        demand.angle_rad = demand.angle_rad.max(angle.abs());
-        demand.speed_rad_s = demand.speed_rad_s.max(speed.min(f64::from(reach.speed)));
-        demand.torque_nm = demand.torque_nm.max(torque.abs());
-    }
-    demand
-}
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
 
+    use super::super::limits::DEFAULT_TIME_S;
     use super::*;
 
     const NONE: Wishes = Wishes { angle: None, torque: None, speed: None, time: DEFAULT_TIME_S };

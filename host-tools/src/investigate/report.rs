@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::changes::{Changes, State};
+use super::changes::{Changes, Reason, State};
 use super::driver::Recorded;
 use super::plan::Plan;
 use super::rounds::Round;
-use super::verification::Verification;
+use super::verification::{Effect, Verification};
 use super::words;
 use crate::link::ParameterSet;
 use crate::outcome::Failure;
@@ -66,13 +66,13 @@ impl Investigation {
         }
     }
 
-    /// What became of the board's parameters, and of the tracking error, in one or two sentences.
+    /// What became of the board's parameters, and of the tracking error, and of what was found, in up to three sentences.
     pub fn conclusion(&self) -> String {
         if let Some(stopped) = &self.stopped {
             return format!("Ended early: {stopped}.");
         }
         let tracking = self.verification.as_ref().map(Verification::in_words);
-        let Some(Changes { state, changes, .. }) = &self.parameters else {
+        let Some(Changes { state, changes, left, .. }) = &self.parameters else {
             return "Not finished.".to_owned();
         };
         let count = words::parameters(changes.len());
@@ -83,11 +83,29 @@ impl Investigation {
                 format!("{count} set until the board is switched off; `bowden params store` keeps them")
             }
             State::Restored => {
-                "The joint followed worse with the new parameters: the board has its old ones again"
-                    .to_owned()
+                let worse = self.followed_worse();
+                let how = if worse { "followed worse" } else { "did not follow better" };
+                format!("The joint {how} with the new parameters: the board has its old ones again")
             }
         };
-        tracking.map_or_else(|| format!("{parameters}."), |tracking| format!("{parameters}; {tracking}."))
+        let mut text = match tracking {
+            Some(tracking) => format!("{parameters}; {tracking}."),
+            None => format!("{parameters}."),
+        };
+        if !left.is_empty() {
+            let left = left.iter().map(|Reason { source, reason }| {
+                format!("{} ({reason})", source.strip_prefix("effects.").unwrap_or(source))
+            });
+            let left: Vec<String> = left.collect();
+            text += &format!(" Left as it is: {}.", left.join("; "));
+        }
+        text
+    }
+
+    /// Whether the joint followed worse with the new parameters.
+    pub fn followed_worse(&self) -> bool {
+        let effect = self.verification.as_ref().and_then(|verification| verification.effect);
+        effect == Some(Effect::Worse)
     }
 
     /// Writes numbers and page; returns where the page is.

@@ -5,21 +5,27 @@ use std::path::{Path, PathBuf};
 use bowden_control::parameters::{Parameters, Reach};
 use serde::Serialize;
 
-use super::plan::{Demand, Limits, demand_of};
-use crate::commands::diagnose::{RIG, save};
+use super::demand::{Demand, demand_of};
+use super::limits::Limits;
 use crate::diagnose::verdict::{Diagnosis, Findings, Verdict};
-use crate::diagnose::{Experiment, diagnose};
+use crate::diagnose::{Allowed, Experiment, diagnose_within};
 use crate::link::course::Track;
 use crate::outcome::Failure;
 use crate::progress::Progress;
+use crate::report::files::{RIG, save};
 use crate::rig::Rig;
-use crate::study::LoadedStudy;
+use crate::study::{LoadedStudy, Role};
 
 /// Samples a second at which a track is looked at, Hz.
 const RATE_HZ: f64 = 1000.0;
 
 /// Factor by which a track may exceed a limit: it was planned from recordings, which have noise.
 const TOLERANCE: f64 = 1.02;
+
+/// Part of its time that an experiment may rest. At rest friction is what the way there has left of it: a staircase that was
+/// to separate `gear_load_friction` from an error of the current's gain (`sim:gear_load_friction:1,seed=702`, 90 s) made
+/// the second diagnosis name `motor_coulomb_friction`.
+const MOST_REST: f64 = 0.2;
 
 /// A motion that separates two hypotheses, and what became of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -41,6 +47,8 @@ pub struct Round {
     pub folder: String,
     /// Recordings that it learned from.
     pub recordings: Vec<String>,
+    /// Recordings of experiments: it learned from two thirds of each and was judged by every third second.
+    pub partly_heldout: Vec<String>,
     /// Recordings that judged it.
     pub heldout: Vec<String>,
     /// Result; the whole of it stands in the folder.
@@ -93,12 +101,16 @@ pub struct Case<'c> {
     pub rig: &'c Path,
     /// Recordings to learn from.
     pub training: &'c [PathBuf],
+    /// Recordings of experiments: to learn from, and every third second to judge by.
+    pub experiments: &'c [PathBuf],
     /// Recordings to judge by.
     pub heldout: &'c [PathBuf],
     /// Folder of the investigation.
     pub folder: &'c Path,
     /// Name of the folder for the results in it.
     pub name: &'c str,
+    /// Which experiments the joint may do.
+    pub allowed: Allowed<'c>,
 }
 
 impl Case<'_> {
@@ -110,7 +122,11 @@ impl Case<'_> {
         let LoadedStudy { study, mut documents, .. } =
             LoadedStudy::of_one_bench(self.rig, self.training, self.heldout)?;
         let document = &mut documents[0];
-        let diagnosed = diagnose(&study, &[], progress)?;
+        let rig = &study.benches[0].rig;
+        let experiments: Result<Vec<_>, Failure> =
+            self.experiments.iter().map(|path| rig.load_recording(path)).collect();
+        let study = study.with(experiments?, Role::Experiment);
+        let diagnosed = diagnose_within(&study, &[], self.allowed, progress)?;
         let folder = self.folder.join(self.name);
         crate::output::prepare_folder(&folder, &[], &[])?;
         save(&diagnosed, &mut [(RIG, &mut *document)], &folder)?;
@@ -124,6 +140,7 @@ impl Case<'_> {
         let round = Round {
             folder: self.name.to_owned(),
             recordings: names(self.training),
+            partly_heldout: names(self.experiments),
             heldout: names(self.heldout),
             diagnosis: Summary::from(diagnosis),
             experiments: Vec::new(),
@@ -143,17 +160,21 @@ impl Case<'_> {
 /// # Errors
 /// The reason why not.
 pub fn track_within(
-    experiment: &Experiment,
+    reference: &Recording,
     limits: &Limits,
     spare_s: f64,
     parameters: &Parameters,
 ) -> Result<Track, String> {
-    let track = Track::of_angle(&experiment.reference).ok_or("it has no reference angle")?;
+    let track = Track::of_angle(reference).ok_or("it has no reference angle")?;
     let seconds = track.duration_s();
     if seconds > spare_s {
         return Err(format!("it takes {seconds:.0} s, {:.0} s are left of --time", spare_s.max(0.0)));
     }
     let angles = track.values_at(RATE_HZ);
+    let resting = angles.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    if resting as f64 > MOST_REST * angles.len() as f64 {
+        return Err("it rests, and friction at rest depends on how the joint came there".to_owned());
+    }
     let [low, high] = limits.angle_rad;
     if let Some(angle) = angles.iter().find(|angle| **angle < TOLERANCE * low || **angle > TOLERANCE * high) {
         return Err(format!("it goes to {angle:.3} rad, allowed are {low:.3} to {high:.3} rad"));
@@ -194,13 +215,14 @@ mod tests {
         };
         let limits = Limits { angle_rad: [-0.5, 0.5], torque_nm: 0.5, speed_rad_s: 1.0, time_s: 100.0 };
         let verdict = |experiment: &Experiment, spare_s| {
-            track_within(experiment, &limits, spare_s, &parameters).map(|track| track.duration_s())
+            track_within(&experiment.reference, &limits, spare_s, &parameters).map(|track| track.duration_s())
         };
         assert!(verdict(&sine(0.4, 0.25), 20.0).is_ok_and(|seconds| (seconds - 12.0).abs() < 0.01));
         for (experiment, spare_s, expected) in [
             (sine(0.4, 0.25), 5.0, "it takes 12 s, 5 s are left"),
             (sine(0.6, 0.25), 20.0, "it goes to 0.51"),
             (sine(0.4, 0.8), 20.0, "it moves at 2.01 rad/s"),
+            (sine(0.0, 0.8), 20.0, "it rests"),
         ] {
             let reason = verdict(&experiment, spare_s).unwrap_err();
             assert!(reason.starts_with(expected), "{reason}");

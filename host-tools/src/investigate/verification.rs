@@ -251,7 +251,7 @@ mod tests {
         let run = |before: f64, after: f64| {
             let parameters = Parameters::default();
             let plan =
-                super::super::plan::Plan::new(&parameters, &super::super::plan::Wishes::default()).unwrap();
+                super::super::plan::Plan::new(&parameters, &super::super::limits::Wishes::default()).unwrap();
             let error = |rms_rad| TrackingError { rms_rad, largest_rad: rms_rad };
             let followed = Followed {
                 run: plan.runs[0].clone(),

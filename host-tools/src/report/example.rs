@@ -20,7 +20,7 @@ const CHANNELS: [(&str, &str, f64, f64); 8] = [
 ];
 
 /// Findings with `samples` samples at 1 kHz in each of eight channels.
-pub(super) fn findings(samples: usize) -> Findings {
+pub(crate) fn findings(samples: usize) -> Findings {
     Findings { diagnosis: diagnosis(), traces: traces(samples), regimes: regimes() }
 }
 

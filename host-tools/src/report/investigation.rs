@@ -1,12 +1,14 @@
 //! The page of an investigation: what it came to, tracking before and after, parameters, diagnoses, plan, recordings.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
-use super::{figures, names, plots, style};
-use crate::diagnose::verdict::{NamedEffect, Trace, Verdict};
+use super::page::document;
+use super::{figures, names, physics, plots};
+use crate::diagnose::verdict::{Trace, Verdict};
 use crate::investigate::changes::{Changes, Reason, State};
 use crate::investigate::driver::Recorded;
-use crate::investigate::plan::{Limits, Plan, Purpose};
+use crate::investigate::limits::Limits;
+use crate::investigate::plan::{Plan, Purpose};
 use crate::investigate::report::{Investigation, RESULT};
 use crate::investigate::rounds::{Asked, Round};
 use crate::investigate::verification::{Effect, Followed, Motion, Verification};
@@ -21,27 +23,17 @@ table.plain { width: auto; } table.plain th, table.plain td { padding-right: 28p
 
 /// Whole document.
 pub(super) fn page(investigation: &Investigation) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Investigation of " (investigation.rig) }
-                style { (PreEscaped(style::CSS)) (PreEscaped(CSS)) }
-            }
-            body { main {
-                (heading(investigation))
-                (numbers(investigation))
-                @if let Some(verification) = &investigation.verification { (tracking(verification)) }
-                @if let Some(changes) = &investigation.parameters { (parameters(changes)) }
-                @if !investigation.rounds.is_empty() { (diagnoses(&investigation.rounds)) }
-                (plan(&investigation.plan))
-                (recordings(&investigation.recordings))
-                (provenance(investigation))
-            } }
-        }
-    }
+    let content = html! {
+        (heading(investigation))
+        (numbers(investigation))
+        @if let Some(verification) = &investigation.verification { (tracking(verification)) }
+        @if let Some(changes) = &investigation.parameters { (parameters(changes)) }
+        @if !investigation.rounds.is_empty() { (diagnoses(&investigation.rounds)) }
+        (plan(&investigation.plan))
+        (recordings(&investigation.recordings))
+        (provenance(investigation))
+    };
+    document(&format!("Investigation of {}", investigation.rig), CSS, &content)
 }
 
 fn heading(investigation: &Investigation) -> Markup {
@@ -49,8 +41,11 @@ fn heading(investigation: &Investigation) -> Markup {
     let effect = investigation.verification.as_ref().and_then(|verification| verification.effect);
     let (class, mark, title) = match (&investigation.stopped, state, effect) {
         (Some(_), ..) => ("unexplained", "?", "Ended early"),
-        (None, Some(State::Restored), _) => {
+        (None, Some(State::Restored), _) if investigation.followed_worse() => {
             ("missing_physics", "!", "The joint followed worse: the old parameters are back")
+        }
+        (None, Some(State::Restored), _) => {
+            ("recalibrate", "≈", "The joint followed no better: the old parameters are back")
         }
         (None, Some(State::Declined), _) => {
             ("recalibrate", "≈", "Diagnosed; the new parameters were declined")
@@ -192,6 +187,7 @@ fn parameters(changes: &Changes) -> Markup {
                     } } }
                 }
             }
+            (reasons("Left as it is", &changes.left))
             (reasons("Not used", &changes.unused))
             (reasons("Cut by a limit of the board", &changes.limited))
         }
@@ -205,7 +201,7 @@ fn diagnoses(rounds: &[Round]) -> Markup {
             @for (index, round) in rounds.iter().enumerate() {
                 @if rounds.len() > 1 { h3 { "Round " (index + 1) } }
                 p { (round.diagnosis.summary) " " a href={ (round.folder) "/report.html" } { "Full report" } }
-                @for effect in &round.diagnosis.effects { (card(effect)) }
+                @for effect in &round.diagnosis.effects { (physics::card(effect)) }
                 @if !round.experiments.is_empty() {
                     h4 { "Experiments that separate hypotheses" }
                     ul { @for Asked { motion, not_done, separation, .. } in &round.experiments { li {
@@ -213,28 +209,6 @@ fn diagnoses(rounds: &[Round]) -> Markup {
                         @match not_done { Some(reason) => { "not done: " (reason) }, None => "done, see the next round" }
                     } } }
                 }
-            }
-        }
-    }
-}
-
-fn card(effect: &NamedEffect) -> Markup {
-    html! {
-        article.card {
-            h3 { (names::words(&effect.id)) " " code { (effect.id) } }
-            p { (effect.sentence) }
-            dl.facts {
-                div { dt { "Probability" } dd { (figures::share(effect.probability)) } }
-                div { dt { "Held-out loss removed" } dd { (figures::share(effect.heldout_improvement)) } }
-                @for (name, estimate) in &effect.parameters {
-                    div { dt { code { (name) } } dd { (figures::estimate(estimate.value, estimate.std, &estimate.unit)) } }
-                }
-            }
-            @if !effect.rivals.is_empty() {
-                h4 { "Not excluded" }
-                ul.rivals { @for rival in &effect.rivals {
-                    li { (names::words(&rival.id)) ", " (figures::share(rival.probability)) }
-                } }
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The page: order of its sections, verdict, provenance.
+//! What all pages share, and the page of a diagnosis: order of its sections, verdict, provenance.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -6,30 +6,34 @@ use crate::diagnose::verdict::{Diagnosis, Findings, Verdict};
 
 use super::{names, physics, place, plots, proof, style};
 
-/// Whole document.
-pub(super) fn page(findings: &Findings) -> Markup {
-    let diagnosis = &findings.diagnosis;
+/// An HTML document with `content` in its body; `css` is added to the style of all pages.
+pub(super) fn document(title: &str, css: &str, content: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Diagnosis of " (diagnosis.rig) }
-                style { (PreEscaped(style::CSS)) }
+                title { (title) }
+                style { (PreEscaped(style::CSS)) (PreEscaped(css)) }
             }
-            body {
-                main {
-                    (verdict(findings))
-                    (place::section(findings))
-                    (physics::section(findings))
-                    (proof::section(findings))
-                    (plots::section(findings))
-                    (provenance(diagnosis))
-                }
-            }
+            body { main { (content) } }
         }
     }
+}
+
+/// Whole document.
+pub(super) fn page(findings: &Findings) -> Markup {
+    let diagnosis = &findings.diagnosis;
+    let content = html! {
+        (verdict(findings))
+        (place::section(findings))
+        (physics::section(findings))
+        (proof::section(findings))
+        (plots::section(findings))
+        (provenance(diagnosis))
+    };
+    document(&format!("Diagnosis of {}", diagnosis.rig), "", &content)
 }
 
 fn verdict(findings: &Findings) -> Markup {

@@ -31,7 +31,8 @@ pub(super) fn section(findings: &Findings) -> Markup {
     }
 }
 
-fn card(effect: &NamedEffect) -> Markup {
+/// A named effect with its parameters and rivals.
+pub(super) fn card(effect: &NamedEffect) -> Markup {
     html! {
         article.card {
             h3 { (names::words(&effect.id)) " " code { (effect.id) } }
