@@ -89,10 +89,9 @@ impl Origin {
     /// Whether new values stay on the board, after what they did to the tracking error.
     pub const fn stays(self, effect: Option<Effect>) -> bool {
         match effect {
-            Some(Effect::Better) => true,
+            Some(Effect::Better) | None => true,
             Some(Effect::Same) => !matches!(self, Self::Recalibrated),
             Some(Effect::Worse) => false,
-            None => true,
         }
     }
 }

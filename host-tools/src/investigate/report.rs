@@ -1,5 +1,6 @@
 //! What an investigation says: the content of `investigation.json`, schema `bowden-investigation/1`, and of its page.
 
+use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -97,7 +98,7 @@ impl Investigation {
                 format!("{} ({reason})", source.strip_prefix("effects.").unwrap_or(source))
             });
             let left: Vec<String> = left.collect();
-            text += &format!(" Left as it is: {}.", left.join("; "));
+            let _ = write!(text, " Left as it is: {}.", left.join("; "));
         }
         text
     }
