@@ -12,7 +12,7 @@ use crate::output;
 use crate::progress::{Progress, UntilInterrupted};
 use crate::report::files::{REPORT, RESULT, earlier_experiments, rig_files, save};
 use crate::rig::RigDocument;
-use crate::study::{LoadedStudy, Study};
+use crate::study::LoadedStudy;
 
 /// Arguments of `bowden diagnose`.
 #[derive(Clone, Debug, clap::Args)]

@@ -12,6 +12,7 @@ use crate::diagnose::{Allowed, Experiment, diagnose_within};
 use crate::link::course::Track;
 use crate::outcome::Failure;
 use crate::progress::Progress;
+use crate::recording::Recording;
 use crate::report::files::{RIG, save};
 use crate::rig::Rig;
 use crate::study::{LoadedStudy, Role};
