@@ -238,9 +238,9 @@ fn the_servos_study_names_the_friction_of_its_gear() {
     let diagnosis = bowden::diagnose::diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
     let named: Vec<&str> = diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
     assert_eq!(named, ["gear_load_friction"]);
-    // 0.1583 and 0.1144 rad on the four recordings that took no part.
+    // 0.1583 and 0.1090 rad on the four recordings that took no part.
     let angle = &diagnosis.fit.channels["theta_out_rad"];
     assert!((angle.before_rmse - 0.1583).abs() < 2e-4, "{angle:?}");
-    assert!((0.105..0.12).contains(&angle.after_rmse), "{angle:?}");
+    assert!((0.1..0.118).contains(&angle.after_rmse), "{angle:?}");
     assert!(diagnosis.unexplained.is_some(), "the servo is not explained by it alone");
 }

@@ -48,7 +48,7 @@ pub const CALIBRATED: [Calibrated; 8] = [
     // and stick and slip imitate that little.
     Calibrated { free_running: true, ..Calibrated::new("motor", "rotor_inertia_kg_m2", 0.7, 0.3) },
     // From a drawing or a caliper, without half the rope's thickness.
-    Calibrated::new("pulleys", "output_radius_m", 0.05, 0.02),
+    Calibrated::new("pulleys", "output_radius_m", 0.02, 0.02),
     // Weighed, but not the arm that carries it.
     Calibrated::new("load", "mass_kg", 0.3, 0.1),
 ];
@@ -156,11 +156,13 @@ mod tests {
     #[test]
     fn what_is_believed_is_a_factor_by_where_it_comes_from() {
         let model = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(10)).unwrap();
-        for (path, spread) in [("pulleys.output_radius_m", 0.05), ("sheath.friction_coefficient", 0.5)] {
+        for (path, spread) in [("pulleys.output_radius_m", 0.02), ("sheath.friction_coefficient", 0.5)] {
             let free = *recalibrated(&model).iter().find(|free| free.path(&model) == path).unwrap();
-            // A tenth more is ln 1.1 of the logarithm.
-            let tenth_more = 1.1_f64.ln();
-            assert!((free.prior_residual(tenth_more) - tenth_more / spread).abs() < 1e-12, "{path}");
+            // Where the value is a tenth more, ln 1.1 of the logarithm.
+            let ln = |x: f64| (free.value_at(x) / free.start()).ln();
+            let tenth_more = 1.1_f64.ln() / ln(1.0);
+            assert!((ln(tenth_more) - 1.1_f64.ln()).abs() < 1e-12, "{path}");
+            assert!((free.prior_residual(tenth_more) - 1.1_f64.ln() / spread).abs() < 1e-12, "{path}");
         }
     }
 }

@@ -36,7 +36,7 @@ impl Place {
 
 /// A parameter that is fitted.
 ///
-/// The optimiser's coordinate is `x = ln(p / p0)` for a ratio and `x = (p - p0) / size` for a difference, with the
+/// The optimiser's coordinate is `x = ln(p / p0) / size` for a ratio and `x = (p - p0) / size` for a difference, with the
 /// starting value `p0`; zero is the start.
 #[derive(Clone, Copy)]
 pub struct Free {
@@ -48,6 +48,10 @@ pub struct Free {
     prior: (f64, f64),
 }
 
+/// Standard deviation of the logarithm of what is believed, below which the optimiser's coordinate is in proportion to it: a step of
+/// its difference quotients is half of a standard deviation at most.
+const CLOSELY_KNOWN: f64 = 0.2;
+
 impl Free {
     /// A nominal parameter of `model`; `None` when the model lacks the part.
     #[must_use]
@@ -57,8 +61,14 @@ impl Free {
         let ratio = start > 0.0 && !name.starts_with("viscous");
         let mut spec = parameter.spec;
         spec.scale = if ratio { Scale::Log } else { Scale::Linear };
-        let size = if ratio { 1.0 } else { spec.default.max(start) };
-        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior: (0.0, spread(parameter)) })
+        let spread = spread(parameter);
+        let size = match ratio {
+            true if spread < CLOSELY_KNOWN => spread / CLOSELY_KNOWN,
+            true => 1.0,
+            false => spec.default.max(start),
+        };
+        let prior = (0.0, if ratio { spread / size } else { spread });
+        Some(Self { place: Place::Nominal(parameter), spec, start, size, prior })
     }
 
     /// A parameter with a value of its own on one bench of `model`; `None` for one of an effect that the model lacks.
@@ -113,12 +123,12 @@ impl Free {
         self
     }
 
-    /// The same parameter with what was believed of it before any recording: a value, and the standard deviation of its
-    /// logarithm, or of its difference in units of its size.
+    /// The same parameter with what was believed of it before any recording: a value, and a standard deviation in the optimiser's
+    /// coordinate.
     #[must_use]
     pub fn believed_within(mut self, value: f64, spread: f64) -> Self {
         let mean = match self.spec.scale {
-            Scale::Log if self.start > 0.0 && value > 0.0 => (value / self.start).ln(),
+            Scale::Log if self.start > 0.0 && value > 0.0 => (value / self.start).ln() / self.size,
             _ => (value - self.start) / self.size,
         };
         self.prior = (mean, spread);
@@ -211,7 +221,7 @@ impl Free {
     #[must_use]
     pub fn value_at(&self, x: f64) -> f64 {
         let value = match self.spec.scale {
-            Scale::Log if self.start > 0.0 => self.start * x.exp(),
+            Scale::Log if self.start > 0.0 => self.start * (self.size * x).exp(),
             _ => self.start + self.size * x,
         };
         value.clamp(self.spec.lower, self.spec.upper)
@@ -221,7 +231,7 @@ impl Free {
     #[must_use]
     pub fn slope_at(&self, value: f64) -> f64 {
         match self.spec.scale {
-            Scale::Log if self.start > 0.0 => value,
+            Scale::Log if self.start > 0.0 => self.size * value,
             _ => self.size,
         }
     }
