@@ -141,7 +141,10 @@ fn the_command_writes_a_rig_that_loads_and_says_what_is_unknown() {
     assert!(fitted.starts_with("# of the lab\n"), "{fitted}");
     let fitted = Rig::load(&at.join("fitted.toml")).unwrap();
     assert_ne!(fitted.joint.sheath, rig().joint.sheath);
-    assert_eq!(fitted.joint.pulleys, rig().joint.pulleys);
+    let [found, stated] = [fitted.joint, rig().joint].map(|joint| joint.pulleys.unwrap());
+    // Of the ratio one radius is moved, and this bench has the stated one.
+    assert_eq!(found.input_radius_m, stated.input_radius_m);
+    assert!((found.output_radius_m / stated.output_radius_m - 1.0).abs() < 0.005, "{found:?}");
 }
 
 #[test]
