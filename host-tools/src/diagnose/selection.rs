@@ -461,10 +461,10 @@ impl Search<'_> {
 /// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.
 ///
 /// Where what is left stands far above what an ordinary bench leaves, other physics is missing too, and what takes a little off
-/// may only imitate it: every factor of ten beyond [`MUCH_LEFT`] asks for [`WORTHWHILE_SHARE`] more.
+/// may only imitate it: every factor of a hundred beyond [`MUCH_LEFT`] asks for [`WORTHWHILE_SHARE`] more.
 #[must_use]
 pub fn worthwhile(before: f64, after: f64) -> bool {
-    let share = WORTHWHILE_SHARE * (1.0 + (after / MUCH_LEFT).log10().max(0.0));
+    let share = WORTHWHILE_SHARE * (1.0 + 0.5 * (after / MUCH_LEFT).log10().max(0.0));
     before - after > WORTHWHILE_LOSS && before - after > share * before
 }
 
@@ -581,7 +581,7 @@ mod tests {
         }
     }
 
-    /// A fifth of what is left is worth a name up to ten squared scales; of a hundred it takes three tenths.
+    /// A fifth of what is left is worth a name up to ten squared scales; of a hundred it takes more than 22 %.
     #[test]
     fn where_much_is_left_an_effect_has_to_take_more_off() {
         for (before, after, named) in
