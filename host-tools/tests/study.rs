@@ -244,3 +244,56 @@ fn the_servos_study_names_the_friction_of_its_gear() {
     assert!((0.1..0.118).contains(&angle.after_rmse), "{angle:?}");
     assert!(diagnosis.unexplained.is_some(), "the servo is not explained by it alone");
 }
+
+/// Two of the servo's gains as two benches, with a winding of their own: each gets its rig file, with the physics of both.
+#[test]
+fn every_bench_of_a_diagnosis_gets_its_rig_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let real = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/xl330-pendulum");
+    let mut study = "schema = \"bowden-study/1\"\nname = \"two servos\"\n".to_owned();
+    for bench in ["weak", "stiff"] {
+        study += &format!(
+            "[[bench]]\nname = {bench:?}\nrig = {:?}\nown = [\"motor.resistance_ohm\"]\n",
+            real.join("xl330.toml")
+        );
+    }
+    for (file, bench, gain) in [
+        ("xl330_kp100_lift_and_drop_10h28m17.csv", "weak", 0.287_738),
+        ("xl330_kp100_sin_sin_10h28m10.csv", "weak", 0.287_738),
+        ("xl330_kp400_lift_and_drop_10h29m21.csv", "stiff", 1.150_951),
+        ("xl330_kp400_sin_sin_10h29m14.csv", "stiff", 1.150_951),
+    ] {
+        study += &format!(
+            "[[recording]]\nfile = {:?}\nbench = {bench:?}\nset = {{ \"controller.gain_duty_per_rad\" = {gain} }}\n",
+            real.join(file)
+        );
+    }
+    fs::write(folder.join("study.toml"), study).unwrap();
+    let (status, _, errors) = bowden(folder, &["diagnose", "study.toml", "--out", "out", "--quiet"]);
+    assert_eq!((status, errors.as_str()), (0, ""));
+    let text = fs::read_to_string(folder.join("out/diagnosis.json")).unwrap();
+    let diagnosis: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let named: Vec<&str> = diagnosis["effects"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|effect| effect["id"].as_str().unwrap())
+        .collect();
+    assert!(named.contains(&"gear_load_friction"), "{named:?}");
+    let stated = Rig::load(&real.join("xl330.toml")).unwrap().joint;
+    for bench in ["weak", "stiff"] {
+        let written = Rig::load(&folder.join(format!("out/rig.diagnosed.{bench}.toml"))).unwrap();
+        assert!(
+            written.effects.iter().any(|effect| effect.descriptor().id == "gear_load_friction"),
+            "{bench}"
+        );
+        let of_bench = diagnosis["recalibrated"].as_array().unwrap().iter().find(|entry| {
+            entry["parameter"] == "motor.resistance_ohm" && entry["bench"].as_str() == Some(bench)
+        });
+        let fitted_ohm = of_bench.unwrap_or_else(|| panic!("{bench}: {text}"))["fitted"].as_f64().unwrap();
+        assert!((written.joint.motor.unwrap().resistance_ohm / fitted_ohm - 1.0).abs() < 1e-6, "{bench}");
+        assert_eq!(written.joint.load.unwrap().arm_m, stated.load.unwrap().arm_m);
+    }
+    assert!(!folder.join("out/rig.diagnosed.toml").exists());
+}

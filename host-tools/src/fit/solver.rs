@@ -171,8 +171,10 @@ impl Problem<'_> {
                 };
                 let [before, ahead] =
                     [-self.step, self.step].map(|step| free.at_bound(free.value_at(self.x[j] + step)));
-                // A moment that lies too late is wrong about what went before it, which only a step back changes.
-                if free.is_moment() && !before && !ahead {
+                // A step ahead alone takes curvature for slope, and a valley is left half-way: in the rounds that find the place
+                // the quotient is symmetric. So it is where a moment lies too late, which only a step back changes.
+                let symmetric = self.step < COARSE_STEP || free.is_moment();
+                if symmetric && !before && !ahead {
                     return Some((at(self.step)? - at(-self.step)?) / (2.0 * self.step));
                 }
                 // Step away from the nearer bound.

@@ -128,3 +128,69 @@ impl Study {
         stated.next().is_some_and(|first| stated.any(|other| other != first))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::effect::ActiveEffect;
+    use bowden_model::effects::find;
+
+    use super::*;
+    use crate::fit::calibrated::recalibrated;
+    use crate::rig::Rig;
+    use crate::test_bench;
+
+    /// Two benches; `change` is what the rig file of the second one states differently.
+    fn study(own: &[&str], change: impl Fn(&mut Rig)) -> Study {
+        let mut study = Study::of_bench(test_bench::rig(), vec![test_bench::swung(10)], Vec::new());
+        let own = own.iter().map(|name| RigParameter::parse(name).unwrap()).collect();
+        let mut rig = test_bench::rig();
+        change(&mut rig);
+        study.benches.push(Bench { name: "second".to_owned(), rig, own });
+        let recording = StudyRecording { bench: 1, ..study.recordings[0].clone() };
+        study.recordings.push(recording);
+        study
+    }
+
+    fn of_bench(study: &Study, bench: usize, joint: &JointModel) -> JointModel {
+        study.variation_of_bench(bench, joint).unwrap().apply(joint)
+    }
+
+    #[test]
+    fn what_rig_files_state_differently_is_not_shared() {
+        let study = study(&[], |rig| {
+            rig.joint.tendon.as_mut().unwrap().pretension_n = 41.0;
+            rig.joint.load.as_mut().unwrap().arm_m = 0.05;
+        });
+        let mut joint = study.joint().unwrap();
+        // A recalibration moves the pretension, on each bench by itself, and the arm on none.
+        let moved: Vec<(String, Option<usize>)> =
+            recalibrated(&joint).iter().map(|free| (free.path(&joint), free.bench(&joint))).collect();
+        let of = |name: &str| -> Vec<Option<usize>> {
+            moved.iter().filter(|(path, _)| path == name).map(|(_, bench)| *bench).collect()
+        };
+        assert_eq!(of("tendon.pretension_n"), [Some(0), Some(1)]);
+        assert_eq!(of("sheath.friction_coefficient"), [None]);
+        assert_eq!(of("load.arm_m"), []);
+        // What is shared reaches both, what is not neither.
+        joint.parameters.sheath.as_mut().unwrap().friction_coefficient = 0.2;
+        joint.parameters.tendon.as_mut().unwrap().pretension_n = 7.0;
+        let [first, second] = [0, 1].map(|bench| of_bench(&study, bench, &joint).parameters);
+        assert_eq!([first, second].map(|p| p.sheath.unwrap().friction_coefficient), [0.2, 0.2]);
+        assert_eq!([first, second].map(|p| p.tendon.unwrap().pretension_n), [30.0, 41.0]);
+        assert_eq!(second.load.unwrap().arm_m, 0.05);
+    }
+
+    #[test]
+    fn a_bench_has_the_parameter_of_an_effect_for_itself() {
+        let study = study(&["effects.joint_backlash.gap_rad"], |_| {});
+        let mut joint = study.joint().unwrap();
+        joint
+            .effects
+            .push(ActiveEffect::with_defaults(find("joint_backlash").unwrap()).with("gap_rad", 0.01));
+        let gaps =
+            |joint: &JointModel| [0, 1].map(|bench| of_bench(&study, bench, joint).effects[0].parameters[0]);
+        assert_eq!(gaps(&joint), [0.01, 0.01], "before a fit has moved it, the effect is as it was found");
+        joint.own.values[0].value = Some(0.03);
+        assert_eq!(gaps(&joint), [0.01, 0.03]);
+    }
+}

@@ -20,7 +20,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
             "1",
             [0.0, 1.0],
             0.1,
-            "friction torque per torque carried, at 1 N·m where the exponent is not 1",
+            "friction torque per torque carried (at 1 N·m where the exponent is not 1)",
         ),
         ParameterSpec::linear("exponent", "1", [1.0, 3.0], 1.0, "power of the torque carried").not_searched(),
     ],
