@@ -13,6 +13,7 @@ mod constancy;
 mod experiment;
 mod layout;
 mod locked;
+mod onset;
 mod place;
 mod residual_map;
 mod screening;

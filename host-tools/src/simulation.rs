@@ -154,6 +154,12 @@ impl ReplayInput {
         self.clock_offset_s = clock_s;
     }
 
+    /// Clock of the bench at the first and at the last sample, s.
+    #[must_use]
+    pub fn clock_s(&self) -> [f64; 2] {
+        [self.t_s.first(), self.t_s.last()].map(|t_s| self.clock_offset_s + t_s.copied().unwrap_or(0.0))
+    }
+
     /// Sampling instants, s.
     #[must_use]
     pub fn t_s(&self) -> &[f64] {
@@ -335,7 +341,7 @@ impl Run<'_> {
         let mut wanted_rad = theta_in_rad(0, 0.0);
         let start_rad = wanted_rad.or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
-        plant.set_time_s(input.clock_offset_s + input.t_s.first().copied().unwrap_or(0.0));
+        plant.set_time_s(input.clock_s()[0]);
         if self.drive == Drive::Duty || self.drive == Drive::Servo {
             plant.set_speed_rad_s(input.start_rad_s);
         }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::candidates::candidates;
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
+use super::onset::between_recordings;
 use super::screening::{Present, Screened, screen};
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Known, Solution, solve_for_ranking, solve_in_rounds};
@@ -221,6 +222,8 @@ struct Fitted {
     loss: f64,
     /// Whether it was fitted to the end, and not just as far as a ranking needs.
     finished: bool,
+    /// Whether the effect that was added last is a moment that no recording shows.
+    unseen: bool,
 }
 
 impl Fitted {
@@ -362,7 +365,9 @@ impl Search<'_> {
         let mut fits: Vec<(usize, Fitted)> =
             fits?.into_iter().enumerate().filter_map(|(place, fitted)| Some((place, fitted?))).collect();
         let best_first = |fits: &mut Vec<(usize, Fitted)>| {
-            fits.retain(|(_, fitted)| !negligible(objective, self.believed, &fitted.newest()));
+            fits.retain(|(_, fitted)| {
+                !fitted.unseen && !negligible(objective, self.believed, &fitted.newest())
+            });
             fits.sort_by(|(_, a), (_, b)| a.best_first(b));
         };
         let mut keep = |place: usize, fitted: &Fitted| {
@@ -397,7 +402,10 @@ impl Search<'_> {
     }
 
     fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
-        self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])
+        let finished = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])?;
+        let model = &finished.solution.model;
+        let unseen = between_recordings(self.objective, model, model.effects.len() - 1)?;
+        Ok(Fitted { unseen, ..finished })
     }
 
     /// Removes effects that the later ones have made superfluous.
@@ -454,7 +462,7 @@ impl Search<'_> {
 
     fn judged(&self, layout: Layout, solution: Solution, finished: bool) -> Fitted {
         let loss = self.objective.mean_loss(&solution.residuals, Part::HeldOut);
-        Fitted { layout, solution, loss, finished }
+        Fitted { layout, solution, loss, finished, unseen: false }
     }
 }
 

@@ -52,6 +52,12 @@ pub struct Free {
 /// its difference quotients is half of a standard deviation at most.
 const CLOSELY_KNOWN: f64 = 0.2;
 
+/// Whether a parameter is a moment at which something happens.
+#[must_use]
+pub fn is_moment(spec: &ParameterSpec) -> bool {
+    spec.unit == "s" && spec.scale == Scale::Linear
+}
+
 impl Free {
     /// A nominal parameter of `model`; `None` when the model lacks the part.
     #[must_use]
@@ -239,7 +245,7 @@ impl Free {
     /// Whether it is a moment at which something happens.
     #[must_use]
     pub fn is_moment(&self) -> bool {
-        self.spec.unit == "s" && self.spec.scale == Scale::Linear
+        is_moment(&self.spec)
     }
 
     /// Whether `value` lies at an end of the accepted range.

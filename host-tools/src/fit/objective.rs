@@ -255,6 +255,22 @@ impl Objective {
             .sum()
     }
 
+    /// Whether something was set differently in a recording that is fitted to.
+    #[must_use]
+    pub fn states_conditions(&self) -> bool {
+        let [fitted, _] = self.split();
+        fitted.datasets.iter().any(|dataset| dataset.states_conditions())
+    }
+
+    /// The recordings that are fitted to and run through `time_s` of their bench's clock.
+    #[must_use]
+    pub fn running_at(&self, time_s: f64) -> Self {
+        let [fitted, _] = self.split();
+        let datasets =
+            fitted.datasets.iter().filter(|dataset| dataset.runs_through(time_s)).cloned().collect();
+        Self { datasets, ..fitted }
+    }
+
     /// Origin of every entry of [`Residuals::values`].
     pub fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
         self.datasets.iter().enumerate().flat_map(|(recording, dataset)| {

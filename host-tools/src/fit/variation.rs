@@ -61,6 +61,12 @@ impl Variation {
         model
     }
 
+    /// Whether something was different in the recording.
+    #[must_use]
+    pub const fn states_conditions(&self) -> bool {
+        !self.set.is_empty()
+    }
+
     /// The bench as its rig file states it, with what was different in the recording.
     #[must_use]
     pub const fn base(&self) -> &JointModel {

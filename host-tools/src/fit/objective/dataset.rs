@@ -69,6 +69,17 @@ impl Dataset {
         }
     }
 
+    /// Whether something was different in this recording.
+    pub(super) fn states_conditions(&self) -> bool {
+        self.variation.as_ref().is_some_and(Variation::states_conditions)
+    }
+
+    /// Whether the bench stood at `time_s` of its clock during this recording.
+    pub(super) fn runs_through(&self, time_s: f64) -> bool {
+        let [start_s, end_s] = self.input.clock_s();
+        (start_s..end_s).contains(&time_s)
+    }
+
     /// What the sensors of this recording would have shown of `model`.
     pub(super) fn replay(&self, model: &JointModel) -> Result<Prediction, Failure> {
         let mut prediction = replay_of(&self.joint(model), &self.input, &self.outputs)?;
