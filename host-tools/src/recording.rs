@@ -11,6 +11,7 @@ mod comma_separated;
 mod mcap_file;
 mod place;
 mod row_writer;
+mod spikes;
 mod text_column;
 
 use std::fs::File;
@@ -210,6 +211,57 @@ impl Recording {
     /// Adds what was lost or repaired.
     pub fn add_notes(&mut self, notes: impl IntoIterator<Item = String>) {
         self.notes.extend(notes);
+    }
+
+    /// Puts what lies between its neighbours in the place of every spike of an angle, a tension or a torque, and notes it.
+    ///
+    /// A spike is a run of at most two samples that stands out of what is before and after it by eight times as much as the
+    /// samples around it change; see [`spikes`] for all conditions. A channel of which more than one sample in fifty would
+    /// be one is left as it is.
+    pub fn set_spikes_aside(&mut self) {
+        let mechanical: Vec<Channel> = self.channels().filter(|channel| channel.is_mechanical()).collect();
+        let mut counted: Vec<String> = Vec::new();
+        let mut first: Option<(usize, String)> = None;
+        let mut set_aside = 0;
+        for channel in mechanical {
+            let values = self.channel(channel).unwrap_or_default();
+            let found = spikes::find(values);
+            let Some(run) = found.first() else { continue };
+            let count: usize = found.iter().map(ExactSizeIterator::len).sum();
+            if first.as_ref().is_none_or(|(start, _)| run.start < *start) {
+                let [got, before, after] = [run.start, run.start - 1, run.end].map(|sample| values[sample]);
+                first =
+                    Some((run.start, format!("{} is {got} between {before} and {after}", channel.role())));
+            }
+            counted.push(format!("{} {count}", channel.role()));
+            set_aside += count;
+            let repaired = spikes::between_neighbours(&self.t_s, values, &found);
+            self.replace(channel, repaired);
+        }
+        if let Some((start, what)) = first {
+            let values = match set_aside {
+                1 => "one value of".to_owned(),
+                _ => format!("{set_aside} values of"),
+            };
+            self.notes.push(format!(
+                "{}: {what}; {values} {} samples stood out as spikes and were set aside ({})",
+                self.place(start),
+                self.len(),
+                counted.join(", ")
+            ));
+        }
+    }
+
+    /// Other values of a channel, whose column stays where it is.
+    fn replace(&mut self, replaced: Channel, repaired: Vec<f64>) {
+        for column in &mut self.columns {
+            if let Column::Known { channel, values } = column
+                && *channel == replaced
+            {
+                *values = Arc::new(repaired);
+                return;
+            }
+        }
     }
 
     /// Topics of the MCAP file that were passed over, sorted; they would be lost if the file were rewritten.

@@ -200,7 +200,7 @@ fn a_recording_that_cannot_be_used_is_named_with_its_place() {
         ),
         (
             "rec.csv",
-            with_line(30, "0.027,0.0,30.0,x"),
+            with_line(30, "0.027,0.0,30.1,x"),
             "rec.csv:30: column `t_s`: got 0.027 s after 0.027 s, expected strictly increasing time; sort the rows \
              and drop repeated ones",
         ),
@@ -226,8 +226,8 @@ fn a_recording_that_cannot_be_used_is_named_with_its_place() {
         ),
         (
             "rec.csv",
-            with_line(40, "0.038,57.2958,30.0,x"),
-            "rec.csv:40: theta_in_rad: got 57.2958, expected within ±12.5664 rad; if it is in degrees, map the \
+            with_line(61, "0.059,57.2958,30.0,x"),
+            "rec.csv:61: theta_in_rad: got 57.2958, expected within ±12.5664 rad; if it is in degrees, map the \
              column under [recording.columns] with its scale",
         ),
         (
@@ -265,7 +265,17 @@ fn what_a_cut_or_gappy_recording_still_holds_is_used_and_said() {
     let whole = gzip(good.as_bytes());
     let mut gap = good.clone();
     gap.insert_str(good.len(), "0.9,0.0,30.0,late\n");
+    let again = |line: usize| good.lines().nth(line - 1).expect("a line of the file");
+    let repeated = with_line(30, &format!("{}\n{}\n{}", again(30), again(30), again(30)));
+    let spiked = with_line(30, "0.028,0.0028,-44.5,x");
     let cases: Vec<(&str, &[u8], &str)> = vec![
+        ("rec.csv", &repeated, "rec.csv:31: the row before it stands here again; 2 such rows were dropped"),
+        (
+            "rec.csv",
+            &spiked,
+            "rec.csv:30: f1_n is -44.5 between 30.03 and 30.03; one value of 60 samples stood out as spikes and were set aside \
+             (f1_n 1)",
+        ),
         ("rec.csv", cut_line, "rec.csv:61: the file ends within this line; the line was dropped"),
         ("rec.csv", bad_last, "rec.csv:61: the file ends within this line; the line was dropped"),
         (

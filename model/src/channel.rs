@@ -102,6 +102,15 @@ impl Channel {
         matches!(self, Self::ThetaRef | Self::ThetaMotor | Self::ThetaIn | Self::ThetaOut)
     }
 
+    /// Whether it is an angle, a tension or a torque that a sensor reads: masses and cables keep it from jumping there and back.
+    #[must_use]
+    pub const fn is_mechanical(self) -> bool {
+        !matches!(
+            self,
+            Self::ThetaRef | Self::Duty | Self::DriveEnable | Self::BusVoltage | Self::MotorCurrent
+        )
+    }
+
     /// SI unit, as it stands in reports.
     #[must_use]
     pub const fn unit(self) -> &'static str {

@@ -33,8 +33,13 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
         ))
     })?;
 
+    let mut repeated: Option<(u64, usize)> = None;
     while let Some(line) = lines.next(&origin.source)? {
         let row = table.len();
+        if row > 0 && lines.repeats() {
+            repeated.get_or_insert((line, 0)).1 += 1;
+            continue;
+        }
         // Whether this line was cut shows only once the end of the data is reached.
         let cut = lines.is_unterminated();
         let whole =
@@ -48,6 +53,12 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
             return Err(Failure::bad_input(format!("{place}: {reason}")));
         }
         origin.notes.push(format!("{place}: the file ends within this line; the line was dropped"));
+    }
+    if let Some((line, count)) = repeated {
+        let place = origin.places.describe_number(&origin.source, line);
+        let rows =
+            if count == 1 { "it was dropped".to_owned() } else { format!("{count} such rows were dropped") };
+        origin.notes.push(format!("{place}: the row before it stands here again; {rows}"));
     }
     if lines.tail().cut_short {
         let whole = table.len();
@@ -63,6 +74,7 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
 struct Lines<R> {
     reader: csv::Reader<BufReader<Tail<R>>>,
     record: csv::ByteRecord,
+    before: csv::ByteRecord,
     mark: u64,
 }
 
@@ -74,11 +86,12 @@ impl<R: Read> Lines<R> {
             .flexible(true)
             .terminator(csv::Terminator::Any(b'\n'))
             .from_reader(text);
-        Self { reader, record: csv::ByteRecord::new(), mark }
+        Self { reader, record: csv::ByteRecord::new(), before: csv::ByteRecord::new(), mark }
     }
 
     /// Reads a line and returns its number; `None` at the end.
     fn next(&mut self, source: &str) -> Result<Option<u64>, Failure> {
+        std::mem::swap(&mut self.record, &mut self.before);
         loop {
             let byte = self.reader.position().byte();
             let more = self
@@ -96,6 +109,11 @@ impl<R: Read> Lines<R> {
                 return Ok(Some(self.reader.position().line() - ended - line_feeds as u64));
             }
         }
+    }
+
+    /// Whether every cell is that of the line before.
+    fn repeats(&self) -> bool {
+        self.record == self.before
     }
 
     /// Whether the data ended before the line did.

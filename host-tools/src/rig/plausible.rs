@@ -33,7 +33,7 @@ struct Limit {
     likely: &'static str,
 }
 
-/// Accepts the recording, with a note on gaps, or says why it cannot be used.
+/// Accepts the recording, with its spikes set aside and notes on them and on gaps, or says why it cannot be used.
 pub(super) fn accept(rig: &Rig, mut recording: Recording, samples: usize) -> Result<Recording, Failure> {
     if recording.len() < samples {
         let got = recording.len();
@@ -53,6 +53,7 @@ pub(super) fn accept(rig: &Rig, mut recording: Recording, samples: usize) -> Res
         let gaps = find_gaps(&recording, step_s);
         recording.add_notes(gaps);
     }
+    recording.set_spikes_aside();
     for channel in recording.channels() {
         let Some(limit) = limit(rig, channel) else { continue };
         let values = recording.channel(channel).unwrap_or_default();
