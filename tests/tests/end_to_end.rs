@@ -58,7 +58,8 @@ fn a_fit_to_the_virtual_bench_recovers_its_parameters() {
     let truth = case.truth_record();
     for (name, short, tolerance) in [
         ("sheath.friction_coefficient", "mu", 0.02),
-        ("tendon.axial_stiffness_n", "ea", 0.02),
+        // The bristles give way before they slip, which a plain rig has only the tendons for.
+        ("tendon.axial_stiffness_n", "ea", 0.03),
         ("tendon.pretension_n", "f0", 0.01),
         ("motor.torque_constant_nm_per_a", "kt", 0.025),
         ("motor.resistance_ohm", "res", 0.025),

@@ -152,7 +152,7 @@ mod tests {
     }
 
     fn of_bench(study: &Study, bench: usize, joint: &JointModel) -> JointModel {
-        study.variation_of_bench(bench, joint).unwrap().apply(joint)
+        study.variation_of_bench(bench, &study.joint().unwrap()).unwrap().apply(joint)
     }
 
     #[test]
