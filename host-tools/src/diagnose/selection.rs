@@ -353,17 +353,7 @@ impl Search<'_> {
             .map(|s| Attempted { effect: s.start, promised: s.gain, heldout_loss: None })
             .collect();
         progress.stage("fitting effects", promising as u64);
-        // One fit by itself leaves threads idle between its rounds of slopes.
-        let fits: Result<Vec<Option<Fitted>>, Failure> = ranked[..promising]
-            .par_iter()
-            .map(|screened| {
-                let fitted = (!progress.interrupted()).then(|| self.fit_new(present, screened)).transpose();
-                progress.advance(1);
-                fitted
-            })
-            .collect();
-        let mut fits: Vec<(usize, Fitted)> =
-            fits?.into_iter().enumerate().filter_map(|(place, fitted)| Some((place, fitted?))).collect();
+        let mut fits = self.fit_promising(present, &ranked[..promising])?;
         let best_first = |fits: &mut Vec<(usize, Fitted)>| {
             fits.retain(|(_, fitted)| {
                 !fitted.unseen && !negligible(objective, self.believed, &fitted.newest())
@@ -432,25 +422,50 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// `present` with one more effect, fitted only as far as a ranking needs.
-    fn fit_new(&self, present: &Fitted, screened: &Screened) -> Result<Fitted, Failure> {
+    /// `present` with each of the candidates, by their places, fitted only as far as a ranking needs.
+    fn fit_promising(&self, present: &Fitted, ranked: &[Screened]) -> Result<Vec<(usize, Fitted)>, Failure> {
+        let Self { objective, progress, .. } = *self;
+        // One fit by itself leaves threads idle between its rounds of slopes.
+        let fits: Result<Vec<Option<(usize, Fitted)>>, Failure> = ranked
+            .par_iter()
+            .enumerate()
+            .map(|(place, screened)| {
+                let fitted =
+                    (!progress.interrupted()).then(|| self.fit_new(present, screened, true)).transpose();
+                progress.advance(1);
+                Ok(fitted?.map(|fitted| (place, fitted)))
+            })
+            .collect();
+        let mut fits: Vec<(usize, Fitted)> = fits?.into_iter().flatten().collect();
+        // The slopes of the present model may have led astray: stick and slip bend the way. Where what was promised would still
+        // be the best, slopes of its own show the way.
+        let training = |fitted: &Fitted| objective.mean_loss(&fitted.solution.residuals, Part::Training);
+        let before = training(present);
+        let best = fits.iter().map(|(_, fitted)| training(fitted)).fold(f64::INFINITY, f64::min);
+        fits.par_iter_mut().try_for_each(|(place, fitted)| {
+            let screened = &ranked[*place];
+            let astray = training(fitted) > (1.0 - KEPT_PROMISE * screened.gain) * before;
+            if astray && (1.0 - screened.gain) * before < best && !progress.interrupted() {
+                let own = self.fit_new(present, screened, false)?;
+                if training(&own) < training(fitted) {
+                    *fitted = own;
+                }
+            }
+            Ok::<(), Failure>(())
+        })?;
+        Ok(fits)
+    }
+
+    /// `present` with one more effect, fitted only as far as a ranking needs, with the slopes of `present` or slopes of its own.
+    fn fit_new(&self, present: &Fitted, screened: &Screened, known_slopes: bool) -> Result<Fitted, Failure> {
         let without = screened.room.as_ref().unwrap_or(&present.solution.model);
         let (layout, with) = present.layout.with(without, screened.start);
         let free = layout.free(self.believed, &with);
         let gone = present.layout.parameters_missing_in(&layout, self.believed);
         let slopes = present.solution.jacobian.clone().remove_columns_at(&gone);
-        let known = Known { jacobian: Some(&slopes), spread: present.solution.spread };
+        let known = Known { jacobian: known_slopes.then_some(&slopes), spread: present.solution.spread };
         let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
-        let training = |residuals| self.objective.mean_loss(residuals, Part::Training);
-        let promised = (1.0 - KEPT_PROMISE * screened.gain) * training(&present.solution.residuals);
-        if training(&solution.residuals) <= promised {
-            return Ok(self.judged(layout, solution, false));
-        }
-        // The slopes of the present model led astray: stick and slip bend the way.
-        let known = Known { jacobian: None, ..known };
-        let own = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
-        let better = if training(&own.residuals) < training(&solution.residuals) { own } else { solution };
-        Ok(self.judged(layout, better, false))
+        Ok(self.judged(layout, solution, false))
     }
 
     /// Fits the nominal parameters and those of all effects that the rig itself did not state.

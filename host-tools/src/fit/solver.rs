@@ -308,7 +308,7 @@ fn solve_knowing(
     let mut problem = problem_at(FINE_STEP, &fixed, x, current);
     let values: Vec<f64> = free.iter().zip(problem.x.iter()).map(|(free, x)| free.value_at(*x)).collect();
     let model = problem.model_at(&problem.x);
-    let (jacobian, stds) = if slopes.is_some() {
+    let (jacobian, stds) = if known.is_some() {
         (DMatrix::zeros(0, 0), vec![None; free.len()])
     } else {
         problem.weigh_priors();
