@@ -71,6 +71,9 @@ pub enum Origin {
     Given,
     /// The diagnosed rig.
     Diagnosed,
+    /// The diagnosed rig without the effects that it found, after the joint had followed worse with their corrections. Parameters
+    /// were fitted beside those effects, so that they stay only where the joint follows better.
+    DiagnosedWithoutEffects,
     /// Fitted nominal parameters of a diagnosis that could not explain what it saw. They may make up for something else, so
     /// that they stay only where the joint follows better.
     Recalibrated,
@@ -90,7 +93,7 @@ impl Origin {
     pub const fn stays(self, effect: Option<Effect>) -> bool {
         match effect {
             Some(Effect::Better) | None => true,
-            Some(Effect::Same) => !matches!(self, Self::Recalibrated),
+            Some(Effect::Same) => !matches!(self, Self::Recalibrated | Self::DiagnosedWithoutEffects),
             Some(Effect::Worse) => false,
         }
     }
@@ -118,6 +121,15 @@ impl Correction {
         });
         let rig = if origin == Origin::Given { given.clone() } else { found.rig };
         Self { origin, rig, unexplained }
+    }
+
+    /// The same without the effects that the diagnosis found; `None` where it found none.
+    pub fn without_effects(&self, given: &Rig) -> Option<Self> {
+        if self.origin != Origin::Diagnosed || self.rig.effects == given.effects {
+            return None;
+        }
+        let rig = Rig { effects: given.effects.clone(), ..self.rig.clone() };
+        Some(Self { origin: Origin::DiagnosedWithoutEffects, rig, unexplained: self.unexplained.clone() })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::changes::{Changes, Correction, Origin, State};
 use super::plan::{Purpose, Run};
-use super::report::Investigation;
+use super::report::{Investigation, TakenBack};
 use super::verification::{Followed, JointEncoder, Motion, Verification};
 use super::{PARAMETERS_AFTER, PARAMETERS_BEFORE, Work, words};
 use crate::link::ParameterSet;
@@ -12,11 +12,46 @@ use crate::outcome::Failure;
 use crate::recording::{ReadOptions, Recording};
 
 impl Work<'_> {
-    /// Sets what a rig changes on the board, and checks that the joint follows its reference no worse.
+    /// Sets what a rig changes on the board, and checks that the joint follows its reference no worse; where it does, with the
+    /// corrections of effects among them, the parameters are tried without those.
     pub(super) fn correct(
         &mut self,
         account: &mut Investigation,
         correction: &Correction,
+    ) -> Result<(), Failure> {
+        self.attempt(account, correction, "")?;
+        let Some(parameters) = correction.without_effects(&self.given) else { return Ok(()) };
+        if !account.followed_worse() || account.parameters.as_ref().is_none_or(|p| p.state != State::Restored)
+        {
+            return Ok(());
+        }
+        let old = self.driver.session.parameters().clone();
+        let (_, transfer) = self.transfer(parameters.clone(), &old)?;
+        if transfer.changes.is_empty() {
+            return Ok(());
+        }
+        self.dialog
+            .show("The joint followed worse; the same parameters without the corrections of effects:\n")?;
+        let first = account.clone();
+        let result = self.attempt(account, &parameters, "-without-effects");
+        let Investigation { parameters: Some(parameters), verification: Some(verification), .. } = first
+        else {
+            return result;
+        };
+        if account.parameters.as_ref().is_some_and(|changes| changes.state == State::Set) {
+            account.taken_back = Some(TakenBack { parameters, verification });
+        } else {
+            (account.parameters, account.verification) = (Some(parameters), Some(verification));
+        }
+        result
+    }
+
+    /// One attempt; `attempt` tells its recordings apart.
+    fn attempt(
+        &mut self,
+        account: &mut Investigation,
+        correction: &Correction,
+        attempt: &str,
     ) -> Result<(), Failure> {
         let old = self.driver.session.parameters().clone();
         let (correction, transfer) = &self.transfer(correction.clone(), &old)?;
@@ -27,7 +62,7 @@ impl Work<'_> {
         let old_encoder = JointEncoder::of(&old)?;
         if transfer.changes.is_empty() {
             account.parameters = changes(State::Unchanged);
-            let before = self.follow(&runs, "before", &old_encoder, &old_encoder)?;
+            let before = self.follow(&runs, &format!("before{attempt}"), &old_encoder, &old_encoder)?;
             account.verification = Some(Verification::of(alone(runs, before)?));
             return Ok(());
         }
@@ -39,11 +74,11 @@ impl Work<'_> {
         // The joint's encoder may be read otherwise with the new parameters: both runs are read as with these.
         let new = old.with(&transfer.values());
         let encoder = JointEncoder::of(&new)?;
-        let before = self.follow(&runs, "before", &old_encoder, &encoder)?;
+        let before = self.follow(&runs, &format!("before{attempt}"), &old_encoder, &encoder)?;
         self.driver.session.replace_parameters(&transfer.values())?;
         save_parameters(&self.setup.folder.join(PARAMETERS_AFTER), &new)?;
         account.parameters = changes(State::Set);
-        let after = match self.follow(&runs, "after", &encoder, &encoder) {
+        let after = match self.follow(&runs, &format!("after{attempt}"), &encoder, &encoder) {
             Ok(after) => after,
             Err(failure) => {
                 // Off first: some parameters are refused while the joint moves.
@@ -153,6 +188,16 @@ mod tests {
         rig: &Rig,
         answer: bool,
     ) -> (Investigation, Result<(), Failure>, Vec<String>) {
+        correct_from(&[], origin, rig, answer)
+    }
+
+    /// The same where the board begins with some other parameters.
+    fn correct_from(
+        begin: &[(&str, f32)],
+        origin: Origin,
+        rig: &Rig,
+        answer: bool,
+    ) -> (Investigation, Result<(), Failure>, Vec<String>) {
         let unexplained = (origin == Origin::Recalibrated)
             .then(|| Reason { source: "f1_n".to_owned(), reason: "Something is left.".to_owned() });
         let correction = Correction { origin, rig: rig.clone(), unexplained };
@@ -161,8 +206,13 @@ mod tests {
             answer,
             &|_, _| unreachable!("nothing is diagnosed"),
             |work, account| {
+                let index = |name| work.driver.session.parameters().find(name).unwrap().index;
+                let values: Vec<(u16, f32)> =
+                    begin.iter().map(|(name, value)| (index(name), *value)).collect();
+                work.driver.session.replace_parameters(&values).unwrap();
                 let old = work.driver.session.parameters().clone();
                 let result = work.correct(account, &correction);
+                account.recordings.clone_from(&work.driver.recorded);
                 let now = ParameterSet::read(work.driver.session.client()).unwrap();
                 let changed = old.all().iter().zip(now.all()).filter(|(old, now)| old.value != now.value);
                 (account.clone(), result, changed.map(|(old, _)| old.name.as_str().to_owned()).collect())
@@ -176,14 +226,47 @@ mod tests {
 
     #[test]
     fn parameters_with_which_the_joint_follows_worse_are_taken_back() {
-        let cogging = "effects = [\"motor_cogging\"]\n[effects.motor_cogging]\namplitude_nm = 0.25\n\
-                       cycles_per_turn = 9.0\nphase_rad = 0.5\n";
-        let (account, result, changed) = correct(&rig(30.0, cogging), true);
+        let (account, result, changed) = correct(&rig(30.0, COGGING), true);
         assert_eq!(result, Ok(()));
         let verification = account.verification.as_ref().unwrap();
         assert_eq!(verification.effect, Some(Effect::Worse), "{}", verification.in_words());
         assert_eq!((state(&account), changed), (State::Restored, Vec::new()));
         assert!(account.conclusion().starts_with("The joint followed worse"), "{}", account.conclusion());
+    }
+
+    const COGGING: &str = "effects = [\"motor_cogging\"]\n[effects.motor_cogging]\namplitude_nm = 0.25\n\
+                           cycles_per_turn = 9.0\nphase_rad = 0.5\n";
+
+    /// The board takes the tendons for softer than they are; the rig knows better, but believes in a cogging that the joint does
+    /// not have.
+    #[test]
+    fn parameters_stay_without_the_corrections_with_which_the_joint_followed_worse() {
+        let begin = [("tendon.axial_stiffness", 55_000.0)];
+        let (account, result, changed) = correct_from(&begin, Origin::Diagnosed, &rig(30.0, COGGING), true);
+        assert_eq!((result, state(&account)), (Ok(()), State::Set), "{}", account.conclusion());
+        assert_eq!(changed, ["tendon.axial_stiffness"]);
+        let verification = account.verification.as_ref().unwrap();
+        assert_eq!(verification.effect, Some(Effect::Better), "{}", verification.in_words());
+        let first = account.taken_back.as_ref().unwrap();
+        assert_eq!(
+            (first.parameters.state, first.verification.effect),
+            (State::Restored, Some(Effect::Worse))
+        );
+        assert_eq!(account.parameters.as_ref().unwrap().rig, Origin::DiagnosedWithoutEffects);
+        let conclusion = account.conclusion();
+        assert!(conclusion.contains("With the corrections of the effects that were found"), "{conclusion}");
+    }
+
+    /// A quarter of a newton more pretension changes nothing of how the joint follows.
+    #[test]
+    fn parameters_that_do_not_help_alone_either_are_taken_back_too() {
+        let (account, result, changed) = correct(&rig(30.25, COGGING), true);
+        assert_eq!((result, changed), (Ok(()), Vec::new()));
+        let driven = |ending: &str| account.recordings.iter().any(|recorded| recorded.file.ends_with(ending));
+        assert!(driven("after.csv") && driven("after-without-effects.csv"), "{:?}", account.recordings);
+        // What did not stay is told as it was first tried.
+        assert_eq!((state(&account), account.taken_back.is_none()), (State::Restored, true));
+        assert_eq!(account.parameters.unwrap().rig, Origin::Diagnosed);
     }
 
     #[test]

@@ -44,10 +44,21 @@ pub struct Investigation {
     pub parameters: Option<Changes>,
     /// Tracking error.
     pub verification: Option<Verification>,
+    /// What was tried before that and taken back.
+    pub taken_back: Option<TakenBack>,
     /// Why it ended early; `None` if it did not.
     pub stopped: Option<String>,
     /// Program and version that wrote this.
     pub written_by: String,
+}
+
+/// New parameters with which the joint followed worse.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TakenBack {
+    /// The parameters.
+    pub parameters: Changes,
+    /// Tracking error.
+    pub verification: Verification,
 }
 
 impl Investigation {
@@ -62,6 +73,7 @@ impl Investigation {
             rounds: Vec::new(),
             parameters: None,
             verification: None,
+            taken_back: None,
             stopped: None,
             written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
         }
@@ -93,6 +105,13 @@ impl Investigation {
             Some(tracking) => format!("{parameters}; {tracking}."),
             None => format!("{parameters}."),
         };
+        if let Some(TakenBack { verification, .. }) = &self.taken_back {
+            let _ = write!(
+                text,
+                " With the corrections of the effects that were found it had followed worse ({}).",
+                verification.in_words()
+            );
+        }
         if !left.is_empty() {
             let left = left.iter().map(|Reason { source, reason }| {
                 format!("{} ({reason})", source.strip_prefix("effects.").unwrap_or(source))
