@@ -101,12 +101,13 @@ impl Problem<'_> {
     }
 }
 
-/// Standard deviation of weighted training residuals, allowing for how long they stay alike; at least 1, what scales say.
+/// Standard deviation of weighted training residuals, at least 1, what scales say, allowing for how long they stay alike: what two
+/// descriptions of a contact differ by lasts as long as a motion, also where it is small, and tells so much less.
 fn spread(objective: &Objective, rows: &[f64], parameters: usize) -> f64 {
     let freedom = rows.len() as f64 / CORRELATED_BLOCKS - parameters as f64;
     let variance = rows.iter().map(|row| row * row).sum::<f64>() / freedom.max(1.0);
     let alike = blocks_alike(objective, rows);
-    (variance * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt().max(1.0)
+    (variance.max(1.0) * (alike / CORRELATED_BLOCKS).max(1.0)).sqrt()
 }
 
 /// Training residuals after the soft loss, weighted as in a fit. Neighbouring blocks tell nearly the same: their weight is that of one block
