@@ -25,9 +25,10 @@ mod words;
 
 use std::collections::BTreeMap;
 
+use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 
-use crate::fit::objective::{Objective, Part};
+use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::variation::Variation;
 use crate::joint_model::JointModel;
@@ -171,7 +172,7 @@ impl Case<'_> {
         let mut selected = select(objective, &search, asked, progress)?;
         let before = Stage::of(objective, model)?;
         progress.stage("refining", 0);
-        let rounds: &[f64] = if selected.complete { &[FINE_STEP] } else { &[] };
+        let rounds: &[f64] = if selected.complete && !self.tensions_unseen() { &[FINE_STEP] } else { &[] };
         let refined =
             |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
         let mut last = refined(&selected.model)?;
@@ -258,6 +259,19 @@ impl Case<'_> {
         let calibrated = Layout::of(self.model).calibrated(self.model);
         let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
         BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted }
+    }
+
+    /// Whether the joint has tendons of which no recording holds a tension.
+    ///
+    /// Then little more than the product of friction and pretension is seen. Fitted without what is ordinary, the two run off
+    /// against each other to make up for it, and the tensions with them: the values that were found beside it are kept.
+    fn tensions_unseen(&self) -> bool {
+        let is_tension = |series: &Series| match series {
+            Series::Channel(channel) => Channel::TENSIONS.contains(channel),
+            Series::Guide => false,
+        };
+        self.model.parameters.tendon.is_some()
+            && !self.objective.scales().iter().any(|(series, _)| is_tension(series))
     }
 
     fn report(

@@ -16,11 +16,13 @@ use bowden_model::channel::Channel;
 use bowden_model::effects::find;
 use bowden_model::parameters::{NOMINAL_PARAMETERS, UNITS_OF_STRENGTH};
 use bowden_tests::prove::plan::plans;
+use bowden_tests::prove::recorded::Recorded;
 use bowden_tests::prove::truth::TRAINING_S;
 use bowden_tests::{recording_of, rms_difference};
 use virtual_bench::{
-    Case, ConcealedEffect, EndStopContact, GearBacklash, JointBacklash, JointTorqueRipple, MotionKind,
-    MotorCoulombFriction, MotorStribeckFriction, Parameter, PretensionLoss, SensorGainError,
+    Case, ConcealedEffect, EndStopContact, GearBacklash, JointBacklash, JointTorqueRipple,
+    JointViscousFriction, MotionKind, MotorCoulombFriction, MotorStribeckFriction, Parameter, PretensionLoss,
+    SensorGainError,
 };
 
 /// Length of the diagnosed recordings, s.
@@ -46,8 +48,12 @@ impl Outcome {
     }
 
     fn over(case: &Case, seconds: f64, asked: &[&str]) -> Self {
+        Self::of_recorded(Recorded::Everything, case, seconds, asked)
+    }
+
+    fn of_recorded(recorded: Recorded, case: &Case, seconds: f64, asked: &[&str]) -> Self {
         let begun = Instant::now();
-        let training = recording_of(&case.train(MotionKind::Lab, seconds).unwrap());
+        let training = recording_of(&recorded.of(case.train(MotionKind::Lab, seconds).unwrap(), 1));
         let second = case.heldout(MotionKind::LabHeldout, SECOND_SECONDS, seconds).unwrap();
         let second = recording_of(&second);
         let rig = Rig::parse(&case.rig_toml(), "rig.toml").unwrap();
@@ -194,6 +200,18 @@ fn nothing_concealed() {
     assert_eq!(outcome.diagnosis.verdict, Verdict::Consistent);
     assert_eq!(outcome.diagnosis.effects, []);
     assert_eq!(outcome.diagnosis.unexplained, None);
+    outcome.predicts_within(1.0);
+}
+
+/// Encoders and motor alone see little more than the product of friction and pretension. What moves along it makes up for what is
+/// ordinary, and the tensions, which nobody recorded, with it.
+#[test]
+fn tensions_that_were_not_recorded_are_predicted_no_worse() {
+    let concealed = JointViscousFriction { coefficient_nm_s_per_rad: 0.06 };
+    let case = Case::new("case", vec![concealed.into()], 105, 3.0);
+    let outcome = Outcome::of_recorded(Recorded::NoTensions, &case, SECONDS, &[]);
+    outcome.names_only("joint_viscous_friction", "joint");
+    assert!(outcome.diagnosis.complete && !outcome.diagnosis.summary.contains("stopped"));
     outcome.predicts_within(1.0);
 }
 
