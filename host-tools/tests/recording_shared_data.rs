@@ -79,7 +79,14 @@ fn cable_driven_tool() {
     assert_eq!(recording.channel(Channel::ThetaIn).unwrap()[0], 1.046_94);
     assert_eq!(recording.channel(Channel::ThetaOut).unwrap()[0], -0.367_57);
     assert_eq!(recording.channel(Channel::TorqueOut).unwrap()[1], -0.008_639);
-    assert!(recording.notes().is_empty(), "{:?}", recording.notes());
+    // Line 25 of the file: -8.40, -8.64, -6.09, -8.48, -8.64 mN·m.
+    let [spikes] = recording.notes() else { panic!("{:?}", recording.notes()) };
+    assert!(
+        spikes.contains("T5L_3__00.csv:25: torque_out_nm is -0.006091 between -0.008639 and -0.00848"),
+        "{spikes}"
+    );
+    let torque_nm = recording.channel(Channel::TorqueOut).unwrap();
+    assert!((torque_nm[23] + 0.008_56).abs() < 1e-5, "{}", torque_nm[23]);
 }
 
 #[test]
