@@ -23,6 +23,9 @@ pub struct Options {
     /// With --corrections: without diagnoses, in minutes; no page is written then
     #[arg(long, requires = "corrections")]
     undiagnosed: bool,
+    /// With --corrections: measure only what runs before, of any commit, have not finished; the page names their commits
+    #[arg(long, requires = "corrections", conflicts_with = "undiagnosed")]
+    resume: bool,
 }
 
 /// Page of the corrections, below the workspace.
@@ -76,11 +79,12 @@ fn corrections(options: &Options) -> Result<(), String> {
         "\n== corrections: the release image on the emulated board, RMS error; control code alone in brackets"
     );
     let mut arguments = vec![target_folder()?.join("corrections").into_os_string()];
-    if options.undiagnosed {
-        arguments.push("--undiagnosed".into());
-    } else if options.effects.is_empty() {
-        let page = workspace().join(CORRECTIONS).into_os_string();
-        arguments.extend(["--page".into(), page, "--provenance".into(), provenance().into()]);
+    arguments.extend(["--provenance".into(), provenance().into()]);
+    for (given, argument) in [(options.undiagnosed, "--undiagnosed"), (options.resume, "--resume")] {
+        arguments.extend(given.then(|| argument.into()));
+    }
+    if !options.undiagnosed && options.effects.is_empty() {
+        arguments.extend(["--page".into(), workspace().join(CORRECTIONS).into_os_string()]);
     }
     arguments.extend(options.effects.iter().cloned());
     on_board("on-board-corrections", &arguments)

@@ -6,6 +6,7 @@
 pub mod cases;
 pub mod diagnosis;
 pub mod page;
+pub mod record;
 
 use std::fs;
 use std::path::Path;

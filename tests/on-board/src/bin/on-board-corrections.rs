@@ -1,6 +1,7 @@
 //! Prints what each correction gains on the emulated board, and writes the page.
 //!
-//! `on-board-corrections FOLDER [--page FILE --provenance TEXT] [--undiagnosed] [NAME...]`: recordings and diagnoses go to FOLDER.
+//! `on-board-corrections FOLDER [--page FILE] [--provenance TEXT] [--resume] [--undiagnosed] [NAME...]`: recordings, diagnoses and
+//! finished rows go to FOLDER. With `--resume` rows that are there are not measured again, whatever build they are of.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,6 +21,7 @@ struct Options {
     folder: PathBuf,
     page: Option<PathBuf>,
     provenance: String,
+    resume: bool,
     undiagnosed: bool,
     names: Vec<String>,
 }
@@ -33,6 +35,7 @@ fn options() -> Outcome<Options> {
         match argument.as_str() {
             "--page" => options.page = Some(value()?.into()),
             "--provenance" => options.provenance = value()?,
+            "--resume" => options.resume = true,
             "--undiagnosed" => options.undiagnosed = true,
             name if name.starts_with('-') => return fail(format!("{name}: not an option")),
             _ => options.names.push(argument),
@@ -91,6 +94,9 @@ fn run(options: &Options) -> Outcome {
 
 fn measured(case: &Case, elf: &[u8], options: &Options) -> Outcome<Row> {
     let folder: &Path = &options.folder.join(case.name.replace(' ', "-"));
+    if let Some(row) = options.resume.then(|| Row::kept(folder)).transpose()?.flatten() {
+        return Ok(row);
+    }
     let stored = case.stored(elf)?;
     let without = case.without()?;
     let before = case.errors(elf, &stored)?;
@@ -105,5 +111,18 @@ fn measured(case: &Case, elf: &[u8], options: &Options) -> Outcome<Row> {
             })
             .map_err(|Failure(text)| text)
     };
-    Ok(Row { case: case.clone(), without, before, with_truth, diagnosed })
+    let row = Row {
+        name: case.name.to_owned(),
+        shown: case.shown.to_owned(),
+        provenance: options.provenance.clone(),
+        without,
+        before,
+        with_truth,
+        diagnosed,
+    };
+    // A row without a diagnosis is not what a resumed run is to have.
+    if !options.undiagnosed {
+        row.keep(folder)?;
+    }
+    Ok(row)
 }

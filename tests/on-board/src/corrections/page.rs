@@ -1,6 +1,8 @@
 //! The table of the corrections, and the page `host-tools/docs/corrections.md`.
 
-use super::{Case, Errors};
+use std::collections::BTreeSet;
+
+use super::Errors;
 
 /// Share of the gain that a diagnosis is to reach \[1\].
 pub const GOAL: f64 = 0.6;
@@ -11,8 +13,12 @@ const LEAST_GAIN: f64 = 0.1;
 /// A line of the table.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// What was run.
-    pub case: Case,
+    /// Name of the case.
+    pub name: String,
+    /// Unit of the errors, a thousandth of it.
+    pub shown: String,
+    /// Date and commit of the run.
+    pub provenance: String,
     /// Without the effect, control code alone.
     pub without: f64,
     /// With the effect, parameters as they were.
@@ -51,8 +57,8 @@ impl Row {
         let diagnosed = self.diagnosed.as_ref();
         let share = self.share().map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
         [
-            self.case.name.to_owned(),
-            self.case.shown.to_owned(),
+            self.name.clone(),
+            self.shown.clone(),
             format!("({:.2})", 1e3 * self.without),
             milli(&self.before),
             diagnosed.map_or("-".to_owned(), |(errors, _)| milli(errors)),
@@ -78,14 +84,14 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
     let said: Vec<String> = rows
         .iter()
         .map(|row| match &row.diagnosed {
-            Ok((_, summary)) => format!("| {} | {summary} |", row.case.name),
-            Err(reason) => format!("| {} | failed: {reason} |", row.case.name),
+            Ok((_, summary)) => format!("| {} | {summary} |", row.name),
+            Err(reason) => format!("| {} | failed: {reason} |", row.name),
         })
         .collect();
     let reached = rows.iter().filter(|row| row.reached()).count();
     format!(
         "# Corrections on the emulated board\n\n\
-         `cargo xtask bench --corrections` wrote this page: {provenance}.\n\n\
+         `cargo xtask bench --corrections` wrote this page: {provenance}.{}\n\n\
          The virtual bench behind the emulated board conceals one effect. The release image runs the joint with the default\n\
          parameters (*before*), then with what `bowden params from-rig` sets: from the rig file that `bowden diagnose` wrote\n\
          (*after diagnosis*), and from a rig file that states the effect (*with true physics*). Reference and noise are the same\n\
@@ -97,9 +103,67 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
          *Share of the gain* is what the diagnosis takes off over what the true physics take off. The goal is {:.0} % of it, and\n\
          never to be worse than before: {reached} of {} reach it.\n\n{HEAD}\n{}\n\n\
          ## What the diagnosis said\n\n| effect | diagnosis |\n|---|---|\n{}\n",
+        kept(rows, provenance),
         100.0 * GOAL,
         rows.len(),
         table.join("\n"),
         said.join("\n"),
     )
+}
+
+/// Says which rows were measured at another commit or on another day; empty if none was.
+fn kept(rows: &[Row], provenance: &str) -> String {
+    let others: BTreeSet<&str> =
+        rows.iter().map(|row| row.provenance.as_str()).filter(|other| *other != provenance).collect();
+    let list = |other: &str| {
+        let names: Vec<&str> =
+            rows.iter().filter(|row| row.provenance == other).map(|row| row.name.as_str()).collect();
+        format!("\n- {other}: {}", names.join(", "))
+    };
+    let lists: String = others.into_iter().map(list).collect();
+    if lists.is_empty() { lists } else { format!(" Rows kept from runs before (`--resume`):\n{lists}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(name: &str, provenance: &str, after: f64) -> Row {
+        let errors = |on_image| Errors { on_image, natively: on_image };
+        Row {
+            name: name.into(),
+            shown: "mrad".into(),
+            provenance: provenance.into(),
+            without: 1e-3,
+            before: errors(11e-3),
+            with_truth: errors(1e-3),
+            diagnosed: Ok((errors(after), "adding it".into())),
+        }
+    }
+
+    #[test]
+    fn the_goal_is_a_share_of_what_the_true_physics_gain() {
+        // 10 mrad to gain: 60 % of it is 5 mrad left.
+        assert!(row("a", "", 4.9e-3).reached() && !row("a", "", 5.1e-3).reached());
+        assert!((row("a", "", 4e-3).share().unwrap() - 0.7).abs() < 1e-12);
+        assert_eq!(
+            row("a", "", 4e-3).line(),
+            "| a | mrad | (1.00) | 11.00 (11.00) | 4.00 (4.00) | 1.00 (1.00) | 70 % | yes |"
+        );
+    }
+
+    #[test]
+    fn where_nothing_is_to_be_gained_a_loss_misses_the_goal() {
+        let idle =
+            |after| Row { with_truth: Errors { on_image: 10.5e-3, natively: 0.0 }, ..row("a", "", after) };
+        assert_eq!(idle(11.5e-3).share(), None);
+        assert!(idle(11.5e-3).reached() && !idle(13e-3).reached());
+    }
+
+    #[test]
+    fn rows_of_other_commits_are_named() {
+        let rows = [row("one", "now", 0.0), row("two", "then", 0.0), row("three", "then", 0.0)];
+        assert!(page(&rows, "now").contains("(`--resume`):\n\n- then: two, three\n\nThe virtual bench"));
+        assert!(!page(&rows[..1], "now").contains("--resume"));
+    }
 }
