@@ -9,13 +9,17 @@ use super::{Case, Stored, write};
 use crate::tool::{Plugged, tool};
 use crate::{Failure, Outcome, fail};
 
-/// Reference of the recording: a multisine of 0.3 rad with its lowest line at 0.25 Hz, four periods, every tenth tick.
+/// Amplitude of the recording's reference \[rad\]: the largest of the runs that are measured. A diagnosis names a torque that is locked
+/// to an angle only where it repeats one and a half times in the travel, and 14 cycles a turn repeat 1.3 times within ±0.3 rad.
+const AMPLITUDE: &str = "0.5";
+
+/// Reference of the recording: a multisine with its lowest line at 0.25 Hz, four periods, every tenth tick.
 const RECORD: [&str; 11] = [
     "--home",
     "--reference",
     "multisine",
     "--amplitude",
-    "0.3",
+    AMPLITUDE,
     "--frequency",
     "0.25",
     "--seconds",
@@ -68,5 +72,28 @@ impl Case {
         let said = String::from_utf8_lossy(&output.stdout);
         let summary = said.lines().next().unwrap_or_default().to_owned();
         Ok(Found { rig: out.join("rig.diagnosed.toml"), summary })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_link::message::{Mode, Reference};
+
+    use super::*;
+    use crate::corrections::cases;
+
+    #[test]
+    fn the_recording_covers_the_angles_of_every_run() {
+        let recorded_rad: f32 = AMPLITUDE.parse().unwrap();
+        let cases = cases::all();
+        let amplitudes_rad = cases.iter().filter_map(|case| match case.trial.reference {
+            Reference::Generated { amplitude, .. } if case.trial.mode == Mode::Position => Some(amplitude),
+            _ => None,
+        });
+        let largest_rad = amplitudes_rad.fold(0.0, f32::max);
+        assert!(
+            0.0 < largest_rad && largest_rad <= recorded_rad,
+            "{largest_rad} rad, {recorded_rad} rad recorded"
+        );
     }
 }

@@ -95,7 +95,7 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
          The virtual bench behind the emulated board conceals one effect. The release image runs the joint with the default\n\
          parameters (*before*), then with what `bowden params from-rig` sets: from the rig file that `bowden diagnose` wrote\n\
          (*after diagnosis*), and from a rig file that states the effect (*with true physics*). Reference and noise are the same\n\
-         in every run of a row. The diagnosis has 16 s of a multisine recorded on the same emulated board with another seed, every\n\
+         in every run of a row. The diagnosis has 16 s of a multisine of 0.5 rad recorded on the same emulated board with another seed, every\n\
          tenth tick, and a rig file that lacks the effect.\n\n\
          Errors are the root of the mean square over whole periods, of the bench's true angle or of the torque that carries\n\
          the load, in brackets those of the control code without a board. Sheath friction and wrap are measured with\n\
