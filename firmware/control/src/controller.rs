@@ -127,6 +127,8 @@ impl Controller {
         } else {
             self.stuck.reset();
             self.starts = false;
+            // A joint that rests expects no friction.
+            self.loops = Loops::default();
             // Points that a run left behind are not followed by the next one; one a tick, so that the tick stays short.
             let _ = inbox.stream_point();
             Action::default()
@@ -207,12 +209,13 @@ impl Controller {
         let supply = self.supply.observe(&config.supply, input.current_raw, input.bus_raw);
         let motor_side = config.sheath.fitted != Fitted::Nothing;
         let measured_load = if motor_side { torque_in } else { Torque::ZERO };
+        let expected_load = if motor_side { torque_in } else { self.loops.expected() };
         let motion = self.observer.observe(
             &config.observer,
             theta[0],
             !pulley.repaired,
             supply.current,
-            measured_load,
+            expected_load,
         );
         let checks = self.supervisor.tension_checks();
         let theta_out_at_input = config.compensator.at_input(theta[1]);
@@ -223,6 +226,7 @@ impl Controller {
             torque_in,
             torque_out,
             current: supply.current,
+            accelerating: self.loops.accelerating(&config.position),
             motion,
             theta_out: theta[1],
             theta_out_at_input,
@@ -332,13 +336,19 @@ impl Controller {
             if mode == Mode::Hybrid {
                 command = config.yielding.command(command, readings.motion.angle);
             }
+            let expected = self.loops.expect_friction(
+                &config.position,
+                &config.torque,
+                rate_sign,
+                readings.sheath.friction_torque,
+            );
             let position = PositionInput {
                 command,
                 command_speed: config.speed_ratio.apply(compensation.omega_d).plus(lead_speed),
                 acceleration: reference.acceleration(config.rate_hz),
                 measured: readings.theta[0],
                 motion: readings.motion,
-                torque_in: readings.load,
+                torque_in: readings.load.plus(expected),
                 ripple,
             };
             let mut torque = self.loops.position(&config.position, &config.drive, &position, limits);

@@ -11,6 +11,13 @@
 //! | position | `τ = J (k_p e + k_i ∫e dt + k_d (ω_c − ω) + α_c) + b ω + τ_m + g (F1 − F3) r1`, `e = θ_c − θ`; `k_p = ω_n²`, `k_d = 2ζω_n`, `k_i = k_p/T_i` |
 //! | torque | `τ = (r1/r2)(T_d + g M s) + b ω + τ_m + k (e + ∫e dt/T_i) − d ω − d_T dT_in/dt`, `e = (r1/r2)(T_d − T_out)`, s the sign of `dT_d/dt`, `M = 2 F0 r2 mu K` of Eq. (15)-(17) with the `mu K` of [`crate::sheath`]; `g M s` and `dT_in/dt` are low-passed |
 //!
+//! Where the input tensions are not measured, the observer's disturbance stands for `(F1 − F3) r1`, and it is late: at a turn the
+//! friction of the sheaths changes by `2 M`, and the pulley gives way by up to `2 M/(J k_p)` meanwhile, 60 mrad of the default joint.
+//! With `compensator.source` 3 the position loop therefore feeds `(r1/r2) g M s` forward as the torque loop does, low-passed by the time
+//! in which the compensator crosses the dead zone (`compensator.rate_limit`). The observer is told of it, so that its disturbance holds the
+//! rest. `M` wrong by half leaves half of the error. Where the crossing takes longer than the disturbance does to settle, as on a joint
+//! whose turns are slowed down because its load rings, nothing is fed forward. The term depends on the reference and on the estimated `mu K`, not on the joint's state: it adds no feedback.
+//!
 //! In position mode with `compensator.source` 3 and measured input tensions, `θ_c` yields to a load that rings ([`ring`]).
 //!
 //! `τ_m` is what [`crate::correction`] adds for friction and ripple of the motor; the duty gets what the bridge leaves of it.
@@ -75,6 +82,9 @@ pub struct PositionConfig {
     pub half_count: Angle,
     /// Damping of a load that rings; none where the input torque is not measured or the compensation is not adaptive.
     pub ring: Option<RingConfig>,
+    /// Low-pass of the friction of the sheaths that is counted on; none where the input torque is measured or the compensation is
+    /// not adaptive.
+    pub expected_friction: Option<Weight<Torque, Torque>>,
 }
 
 /// Gains of the torque loop.
@@ -108,6 +118,8 @@ pub struct Loops {
     ring: Ring,
     torque: Sum<Torque>,
     friction: Sum<Torque>,
+    /// Friction of the sheaths that the position loop counts on, at the input pulley.
+    expected: Torque,
     /// Low-passed input torque.
     slow: Sum<Torque>,
     /// The reference fell when it moved last.
@@ -170,6 +182,50 @@ impl Loops {
             limits.insert(Limit::Integrator);
         }
         !pushes
+    }
+
+    /// Friction of the sheaths in the direction of the reference, at the input pulley; 0 where it is measured. `friction` is that of the
+    /// joint.
+    #[inline]
+    pub fn expect_friction(
+        &mut self,
+        config: &PositionConfig,
+        torque: &TorqueConfig,
+        rate_sign: i32,
+        friction: Torque,
+    ) -> Torque {
+        let Some(filter) = config.expected_friction else { return Torque::ZERO };
+        let friction = torque.at_input.apply(self.along(rate_sign, torque.friction.apply(friction)));
+        self.expected = self.friction.approach(filter, friction);
+        self.expected
+    }
+
+    /// Friction in the direction in which the reference moved last.
+    #[inline]
+    fn along(&mut self, rate_sign: i32, friction: Torque) -> Torque {
+        match rate_sign {
+            1.. => self.falls = false,
+            0 => {}
+            _ => self.falls = true,
+        }
+        if self.falls { friction.negated() } else { friction }
+    }
+
+    /// Friction that was counted on in the last tick.
+    #[inline]
+    #[must_use]
+    pub const fn expected(&self) -> Torque {
+        self.expected
+    }
+
+    /// Torque that accelerates the rotor as the reference wants it; 0 where friction is not expected.
+    #[inline]
+    #[must_use]
+    pub fn accelerating(&self, config: &PositionConfig) -> Torque {
+        match config.expected_friction {
+            Some(_) => config.inertia.apply(self.feedforward.value()),
+            None => Torque::ZERO,
+        }
     }
 
     /// Torque for the input pulley that the position loop asks for.
@@ -250,14 +306,8 @@ impl Loops {
             ripple,
         } = *input;
         let speed = motion.speed;
-        match rate_sign {
-            1.. => self.falls = false,
-            0 => {}
-            _ => self.falls = true,
-        }
         let slow = self.slow.approach(config.lead_filter, measured_load);
-        let friction = config.friction.apply(friction);
-        let friction = if self.falls { friction.negated() } else { friction };
+        let friction = self.along(rate_sign, config.friction.apply(friction));
         let friction = self.friction.approach(config.friction_filter, friction);
         let error = config.at_input.apply(wanted.minus(measured));
         if self.may_integrate(error.to_bits(), limits) {
@@ -360,6 +410,40 @@ mod tests {
         for bus_v in [0.0, -5.0, 2000.0] {
             let (value, _) = duty(&config, 2000.0, 2000.0, bus_v);
             assert!((0..=31_129).contains(&value), "{value} at {bus_v} V");
+        }
+    }
+
+    #[test]
+    fn friction_that_is_not_measured_is_expected_in_the_direction_of_the_reference() {
+        let expected_nm = |source: f32, fitted: f32, rate_limit: f32, signs: &[i32]| {
+            let mut parameters = Parameters::default();
+            parameters.compensator.source = source;
+            parameters.compensator.rate_limit = rate_limit;
+            parameters.tension.fitted = fitted;
+            parameters.pulley.output_radius = 0.03;
+            let config = tick_config(&parameters).unwrap();
+            let mut loops = Loops::default();
+            for sign in signs {
+                // A fifth of a second: ten times the low-pass of a crossing at 1 rad/s.
+                for _ in 0..2000 {
+                    loops.expect_friction(&config.position, &config.torque, *sign, Torque::from_f32(0.4));
+                }
+            }
+            loops.expected().to_f32()
+        };
+        // The input pulley is half as large: 0.2 N·m there. A reference that stands leaves the direction.
+        for (signs, expected) in [(&[1][..], 0.2), (&[1, 0], 0.2), (&[1, -1], -0.2), (&[1, -1, 0], -0.2)] {
+            assert!((expected_nm(3.0, 0.0, 1.0, signs) - expected).abs() < 1e-4, "{signs:?}");
+        }
+        // F0 L tanh(mu K/2)/(EA r1) is 5.11 mrad to either side: at 0.2 rad/s 51.1 ms, so 0.2 (1 - e^-3.914) after 0.2 s.
+        let slow_nm = expected_nm(3.0, 0.0, 0.2, &[1]);
+        assert!((slow_nm - 0.196_01).abs() < 1e-3, "{slow_nm}");
+        // The disturbance of the observer with 20 Hz settles within 95 ms: 0.107 rad/s.
+        assert!(expected_nm(3.0, 0.0, 0.11, &[1]) > 0.1);
+        assert_eq!(expected_nm(3.0, 0.0, 0.10, &[1]), 0.0);
+        // Tensions at the motor are measured; and what is not followed is not expected.
+        for (source, fitted) in [(3.0, 1.0), (3.0, 2.0), (0.0, 0.0), (1.0, 0.0)] {
+            assert_eq!(expected_nm(source, fitted, 1.0, &[1]), 0.0, "source {source}, fitted {fitted}");
         }
     }
 

@@ -16,7 +16,7 @@
 //! |---|---|
 //! | all four | the first row, for each cable on its own |
 //! | f1 and f3 | `T_in` measured, `T_out` from the stretch: the second row, one value for both cables |
-//! | none | the same with `T_in` from motor current and friction of the motor |
+//! | none | the same with `T_in` from motor current, friction of the motor and what accelerates its rotor |
 //!
 //! When a cable slips. Friction never exceeds its limit, so a difference above the present `q` proves that `q` is too small,
 //! whatever the cable does. A difference below it says that `q` is too large only where the cable slips: at an end of the dead
@@ -117,6 +117,8 @@ pub struct SheathInput {
     pub torque_out: Torque,
     /// Motor current.
     pub current: Current,
+    /// Torque that accelerates the rotor as the reference wants it, of the torque that the current makes.
+    pub accelerating: Torque,
     /// Observed angle and speed of the input pulley.
     pub motion: Motion,
     /// Measured angle of the joint.
@@ -281,7 +283,8 @@ impl SheathObserver {
     pub fn observe(&mut self, config: &SheathConfig, input: &SheathInput) -> SheathEstimate {
         let measured_in = match config.fitted {
             Fitted::Nothing => {
-                config.drive.apply(input.current).minus(config.viscous.apply(input.motion.speed))
+                let own = config.viscous.apply(input.motion.speed).plus(input.accelerating);
+                config.drive.apply(input.current).minus(own)
             }
             Fitted::Input | Fitted::All => input.torque_in,
         };
@@ -503,11 +506,14 @@ mod tests {
             let torque = |more: f64, less: f64| Torque::from_f32(((more - less) * joint.radius_m) as f32);
             let speed = 0.5 * direction;
             let torque_in_nm = (f1 - f3) * joint.radius_m;
+            // The rotor takes a torque too, which must not count as friction.
+            let accelerating_nm = 0.1 * direction;
             let input = SheathInput {
                 tensions,
                 torque_in: torque(f1, f3),
                 torque_out: torque(f2, f4),
-                current: Current::from_f32(((torque_in_nm + 0.02 * speed) / 0.9) as f32),
+                current: Current::from_f32(((torque_in_nm + 0.02 * speed + accelerating_nm) / 0.9) as f32),
+                accelerating: Torque::from_f32(accelerating_nm as f32),
                 motion: Motion {
                     angle: Angle::from_f32(angle_rad as f32),
                     speed: Speed::from_f32(speed as f32),

@@ -234,8 +234,18 @@ pub struct Way {
 }
 
 /// Ways that are compared.
-pub const WAYS: [Way; 3] = [
-    Way { name: "none (`compensator.source` 0)", change: |parameters| parameters.compensator.source = 0.0 },
+pub const WAYS: [Way; 4] = [
+    Way {
+        name: "none (`compensator.source` 0), four tensions",
+        change: |parameters| parameters.compensator.source = 0.0,
+    },
+    Way {
+        name: "none, encoders and current only",
+        change: |parameters| {
+            parameters.compensator.source = 0.0;
+            parameters.tension.fitted = 0.0;
+        },
+    },
     Way { name: "default: four tensions (1)", change: |_| () },
     Way {
         name: "encoders and current only (3)",

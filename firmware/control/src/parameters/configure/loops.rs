@@ -3,7 +3,7 @@
 use bowden_link::message::Refusal;
 
 use super::{RAD_PER_COUNT, conflict, fitted, gain, inertia, torque_constant};
-use crate::compensator::Source;
+use crate::compensator::{LagAngles, Source};
 use crate::correction::MotorCorrection;
 use crate::correction::dead_zone::DeadZone;
 use crate::drive::ring::RingConfig;
@@ -11,6 +11,9 @@ use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::parameters::Parameters;
 use crate::scale::{Angle, Current, Quantity, Weight};
 use crate::sheath::Fitted;
+
+/// Time in which the friction that is fed forward changes sign, s.
+const FRICTION_FILTER_S: f32 = 0.02;
 
 pub(super) fn position(parameters: &Parameters, period_s: f32) -> Result<PositionConfig, Refusal> {
     /// Low-pass of the reference's acceleration, s. Lag of a 1.5 Hz sine: 5°.
@@ -31,12 +34,24 @@ pub(super) fn position(parameters: &Parameters, period_s: f32) -> Result<Positio
         acceleration_filter: Weight::low_pass(ACCELERATION_FILTER_S, period_s),
         load_feedforward: gain(controller.load_feedforward, "controller.load_feedforward")?,
         half_count: Angle::from_f32(0.5 * RAD_PER_COUNT),
+        expected_friction: expected_friction_s(parameters).map(|time_s| Weight::low_pass(time_s, period_s)),
         ring: if Source::of(parameters) == Source::Adaptive && fitted(parameters) != Fitted::Nothing {
             Some(RingConfig::new(parameters).ok_or_else(|| conflict("controller.tension_damping"))?)
         } else {
             None
         },
     })
+}
+
+/// Time in which the compensator crosses the dead zone of the nominal `mu K`, s; none where the input torque is measured, the
+/// compensation is not adaptive, or the observer's disturbance settles sooner.
+fn expected_friction_s(parameters: &Parameters) -> Option<f32> {
+    /// Time in which the disturbance settles, over that of its slowest pole, `3/ω_o`.
+    const SETTLED: f32 = 4.0;
+    let needed = Source::of(parameters) == Source::Adaptive && fitted(parameters) == Fitted::Nothing;
+    let crossing_s = 2.0 * LagAngles::new(parameters).friction_rad / parameters.compensator.rate_limit;
+    let settling_s = SETTLED * 3.0 / (core::f32::consts::TAU * parameters.controller.observer_bandwidth);
+    (needed && crossing_s < settling_s).then_some(crossing_s.max(FRICTION_FILTER_S))
 }
 
 /// Gain and damping of the torque loop with the tensions that are there.
@@ -56,8 +71,6 @@ pub(super) fn torque_gains(parameters: &Parameters) -> (f32, f32) {
 pub(super) fn torque(parameters: &Parameters, period_s: f32) -> Result<TorqueConfig, Refusal> {
     /// Low-pass whose difference to the input torque is its rate, s.
     const LEAD_FILTER_S: f32 = 0.005;
-    /// Time in which the friction that is fed forward changes sign, s.
-    const FRICTION_FILTER_S: f32 = 0.02;
     let controller = &parameters.controller;
     let (torque_gain, damping) = torque_gains(parameters);
     let at_input = parameters.pulley.input_radius / parameters.pulley.output_radius;
