@@ -310,6 +310,9 @@ impl SheathObserver {
                 }
                 Fitted::Nothing | Fitted::Input => {}
             }
+        } else if self.second {
+            // Parameters may change while the joint moves.
+            self.cables = [Follower::at(config.nominal); 2];
         }
         if self.second {
             self.friction = Friction::of(config, &self.cables);
@@ -634,9 +637,13 @@ mod tests {
         let mut config = config(2.0);
         config.adapts = false;
         let mut observer = SheathObserver::default();
-        let estimate = follow(&config, &mut observer, 2.0, 0.4, |_| [0.8; 2]);
-        assert_eq!(estimate.ratio, [config.nominal; 2]);
-        assert!(estimate.known);
+        // The second value is set while the joint moves.
+        for exponent in [0.12 * PI, 0.2 * PI] {
+            config.nominal = Ratio::from_f32((exponent / 2.0).tanh() as f32);
+            let estimate = follow(&config, &mut observer, 2.0, 0.4, |_| [0.8; 2]);
+            assert_eq!(estimate.ratio, [config.nominal; 2]);
+            assert!(estimate.known);
+        }
     }
 
     #[test]
