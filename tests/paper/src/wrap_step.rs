@@ -40,6 +40,15 @@ pub fn step_cases() -> Vec<StepCase> {
         .collect()
 }
 
+/// How the firmware knows K.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Knowledge {
+    /// By its own observer.
+    Observed,
+    /// K is set right, without error, in the tick of the step: no observer knows it sooner, so what is left is the control's.
+    AtOnce,
+}
+
 /// What a step of K does to the torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepFigures {
@@ -64,14 +73,27 @@ impl StepCase {
         (self.phase.rem_euclid(0.5) - 0.25).abs() < 0.4 * STEP_FREQUENCY_HZ
     }
 
-    /// Runs the step; `seed` is that of the sensor noise.
+    /// Runs the step with the firmware's observer; `seed` is that of the sensor noise.
     ///
     /// # Errors
     /// [`ExperimentError`] if the supervisor stops the joint.
     pub fn run(&self, seed: u64) -> Result<StepFigures, ExperimentError> {
+        self.run_knowing(Knowledge::Observed, seed)
+    }
+
+    /// The same with another knowledge of K.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] if the supervisor stops the joint.
+    pub fn run_knowing(&self, knowledge: Knowledge, seed: u64) -> Result<StepFigures, ExperimentError> {
         const WINDOW: usize = 50;
         let bench = BenchConfig { wrap_angle_rad: PI, ..BenchConfig::default() };
-        let mut joint = DrivenJoint::ready(&bench, parameters_of(&bench), seed)?;
+        let mut parameters = parameters_of(&bench);
+        if knowledge != Knowledge::Observed {
+            parameters.sheath.adapts = 0.0;
+            parameters.sheath.wrap_angle = self.wrap_angle_rad[0] as f32;
+        }
+        let mut joint = DrivenJoint::ready(&bench, parameters, seed)?;
         joint.refer(Reference::Generated {
             shape: Shape::Sine,
             amplitude: STEP_TORQUE_NM as f32,
@@ -86,6 +108,11 @@ impl StepCase {
         let mut errors_nm = Vec::with_capacity(2 * second);
         for tick in 0..step + second {
             joint.set_wrap_angle_rad([self.wrap_angle_rad[usize::from(tick >= step)]; 2])?;
+            if tick == step && knowledge == Knowledge::AtOnce {
+                let mut parameters = joint.parameters().clone();
+                parameters.sheath.wrap_angle = self.wrap_angle_rad[1] as f32;
+                joint.configure(parameters)?;
+            }
             let output = joint.tick()?;
             if tick + second >= step {
                 errors_nm.push(DrivenJoint::reference(&output) - joint.torque_out_nm());
@@ -109,8 +136,13 @@ impl StepCase {
 ///
 /// # Errors
 /// That of the first run that fails.
-pub fn run_steps(cases: &[StepCase], seeds: &[u64]) -> Result<Vec<Vec<StepFigures>>, ExperimentError> {
+pub fn run_steps(
+    cases: &[StepCase],
+    knowledge: Knowledge,
+    seeds: &[u64],
+) -> Result<Vec<Vec<StepFigures>>, ExperimentError> {
     let pairs: Vec<_> = cases.iter().flat_map(|case| seeds.iter().map(move |seed| (*case, *seed))).collect();
-    let runs: Result<Vec<_>, _> = pairs.par_iter().map(|(case, seed)| case.run(*seed)).collect();
+    let runs: Result<Vec<_>, _> =
+        pairs.par_iter().map(|(case, seed)| case.run_knowing(knowledge, *seed)).collect();
     Ok(runs?.chunks(seeds.len()).map(<[StepFigures]>::to_vec).collect())
 }

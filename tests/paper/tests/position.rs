@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use bowden_paper::position::{
     PRETENSION_FACTORS, SineFigures, WAYS, frequency_cases, load_cases, pretension_cases, run_all,
 };
-use bowden_paper::wrap_step::{STEP_LIMIT_S, StepCase};
+use bowden_paper::wrap_step::{Knowledge, STEP_LIMIT_S, StepCase};
 
 const SEED: u64 = 406;
 
@@ -68,5 +68,24 @@ fn the_torque_is_back_after_a_step_of_the_wrap_angle() {
         let figures = StepCase { wrap_angle_rad, phase }.run(SEED).expect("runs");
         println!("{phase} {wrap_angle_rad:.2?}: {figures:.3?}");
         assert!(back_s.contains(&figures.back_s) && largest_nm.contains(&figures.largest_nm), "{figures:?}");
+    }
+}
+
+/// Far from a turn an observer that knows K at once is in time, ahead of one it is not: there the control is what takes longer.
+#[test]
+fn the_goal_is_missed_ahead_of_a_turn_whatever_is_known_of_the_wrap_angle() {
+    let (up, down) = ([0.5 * PI, 1.5 * PI], [1.5 * PI, 0.5 * PI]);
+    for (wrap_angle_rad, phase, back_s) in [
+        (down, 0.0625, 0.02..STEP_LIMIT_S),
+        (up, 0.1875, STEP_LIMIT_S..0.7),
+        (down, 0.1875, STEP_LIMIT_S..0.9),
+        (down, 0.3125, STEP_LIMIT_S..0.7),
+    ] {
+        let case = StepCase { wrap_angle_rad, phase };
+        let [observed, known] =
+            [Knowledge::Observed, Knowledge::AtOnce].map(|it| case.run_knowing(it, SEED).expect("runs"));
+        println!("{phase} {wrap_angle_rad:.2?}: {observed:.3?}, {known:.3?}");
+        assert!(back_s.contains(&known.back_s), "{known:?}");
+        assert!(known.back_s < observed.back_s + 0.02, "{known:?}, {observed:?}");
     }
 }
