@@ -91,7 +91,7 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
     let reached = rows.iter().filter(|row| row.reached()).count();
     format!(
         "# Corrections on the emulated board\n\n\
-         `cargo xtask bench --corrections` wrote this page: {provenance}.{}\n\n\
+         `cargo xtask bench --corrections` wrote this page: {provenance}.{}{}\n\n\
          The virtual bench behind the emulated board conceals one effect. The release image runs the joint with the default\n\
          parameters (*before*), then with what `bowden params from-rig` sets: from the rig file that `bowden diagnose` wrote\n\
          (*after diagnosis*), and from a rig file that states the effect (*with true physics*). Reference and noise are the same\n\
@@ -104,11 +104,23 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
          never to be worse than before: {reached} of {} reach it.\n\n{HEAD}\n{}\n\n\
          ## What the diagnosis said\n\n| effect | diagnosis |\n|---|---|\n{}\n",
         kept(rows, provenance),
+        lacking(rows),
         100.0 * GOAL,
         rows.len(),
         table.join("\n"),
         said.join("\n"),
     )
+}
+
+/// Says which cases have no row; empty if all have one.
+fn lacking(rows: &[Row]) -> String {
+    let all = super::cases::all();
+    let names: Vec<&str> =
+        all.iter().map(|case| case.name).filter(|name| rows.iter().all(|row| row.name != *name)).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        names => format!(" Not measured yet, `--resume` does it: {}.", names.join(", ")),
+    }
 }
 
 /// Says which rows were measured at another commit or on another day; empty if none was.
@@ -163,7 +175,16 @@ mod tests {
     #[test]
     fn rows_of_other_commits_are_named() {
         let rows = [row("one", "now", 0.0), row("two", "then", 0.0), row("three", "then", 0.0)];
-        assert!(page(&rows, "now").contains("(`--resume`):\n\n- then: two, three\n\nThe virtual bench"));
-        assert!(!page(&rows[..1], "now").contains("--resume"));
+        assert!(page(&rows, "now").contains("(`--resume`):\n\n- then: two, three"));
+        assert!(!kept(&rows[..1], "now").contains("--resume"));
+    }
+
+    #[test]
+    fn cases_without_a_row_are_named() {
+        let mut rows: Vec<Row> =
+            super::super::cases::all().iter().map(|case| row(case.name, "", 0.0)).collect();
+        assert_eq!(lacking(&rows), "");
+        let last = rows.pop().unwrap();
+        assert!(lacking(&rows).ends_with(&format!(": {}.", last.name)));
     }
 }
