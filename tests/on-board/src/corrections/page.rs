@@ -103,8 +103,8 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
          *Share of the gain* is what the diagnosis takes off over what the true physics take off. The goal is {:.0} % of it, and\n\
          never to be worse than before: {reached} of {} reach it.\n\n{HEAD}\n{}\n\n\
          ## What the diagnosis said\n\n| effect | diagnosis |\n|---|---|\n{}\n",
-        kept(rows, provenance),
         lacking(rows),
+        kept(rows, provenance),
         100.0 * GOAL,
         rows.len(),
         table.join("\n"),
