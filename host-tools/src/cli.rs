@@ -4,6 +4,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::panic::PanicHookInfo;
 
+use bowden_core::outcome::{ExitStatus, Failure, Outcome, one_line};
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
@@ -11,7 +12,6 @@ use crate::commands::{
     check::CheckArguments, convert::ConvertArguments, fit::FitArguments, replay::ReplayArguments,
     simulate::SimulateArguments,
 };
-use crate::outcome::{ExitStatus, Failure, Outcome, one_line};
 use crate::progress;
 
 /// Finds which physics a simulated tendon-driven joint lacks, from recordings of the real one

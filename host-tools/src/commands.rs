@@ -15,10 +15,10 @@ pub mod simulate;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::recording::Recording;
-use crate::study::LoadedStudy;
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::recording::Recording;
+use bowden_core::study::LoadedStudy;
 
 /// Writes a result to standard output. A reader that left early (`bowden check ... | head -1`) is no failure.
 ///

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::outcome::Failure;
+use bowden_core::outcome::Failure;
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 

@@ -1,26 +1,13 @@
-//! Progress of long work, on stderr.
+//! Shows the progress of long work on stderr.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use bowden_core::progress::{Progress, Quiet};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::interrupt;
-
-/// Receives the progress of long work; may be called from several threads.
-pub trait Progress: Sync {
-    /// A stage begins that consists of so many steps; 0 if the number is not known.
-    fn stage(&self, name: &str, steps: u64);
-
-    /// So many steps of the stage are done.
-    fn advance(&self, steps: u64);
-
-    /// Whether the user wants the work to end with what there is.
-    fn interrupted(&self) -> bool {
-        false
-    }
-}
 
 /// The progress display for this process: a bar on a terminal, else now and then a line, nothing when `quiet`.
 pub fn for_stderr(quiet: bool) -> Box<dyn Progress> {
@@ -51,15 +38,6 @@ impl Progress for UntilInterrupted<'_> {
     fn interrupted(&self) -> bool {
         interrupt::requested()
     }
-}
-
-/// Shows nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct Quiet;
-
-impl Progress for Quiet {
-    fn stage(&self, _name: &str, _steps: u64) {}
-    fn advance(&self, _steps: u64) {}
 }
 
 /// A bar that is redrawn in place and vanishes at the end.

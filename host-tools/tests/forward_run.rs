@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use bowden::recording::{ReadOptions, Recording};
+use bowden_core::recording::{ReadOptions, Recording};
 use bowden_model::channel::Channel;
 
 const MOTOR: &str = r"
@@ -85,7 +85,7 @@ fn spread(values: &[f64]) -> f64 {
 fn a_whole_bench_has_the_columns_of_a_recording() {
     let recording =
         simulate(&[MOTOR, TENDON, LOAD, SENSORS], &["--seconds", "6", "--motion", "sine"]).unwrap();
-    let names: Vec<&str> = recording.columns().iter().map(bowden::recording::Column::name).collect();
+    let names: Vec<&str> = recording.columns().iter().map(bowden_core::recording::Column::name).collect();
     let expected = "theta_ref_rad theta_in_rad theta_out_rad f1_n f2_n f3_n f4_n duty bus_v i_motor_a";
     assert_eq!(names.join(" "), expected);
     assert_eq!(recording.len(), 6000);

@@ -12,7 +12,7 @@ use std::time::Duration;
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::io::Errno;
 
-const RIG: &str = include_str!("rigs/bench.toml");
+const RIG: &str = include_str!("../core/tests/rigs/bench.toml");
 
 fn bowden(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bowden"));

@@ -10,12 +10,12 @@ use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
-use bowden::investigate::limits::Wishes;
-use bowden::investigate::{Dialog, Setup, investigate};
-use bowden::link::sim::SimTransport;
-use bowden::link::{Client, Transport};
-use bowden::outcome::Failure;
-use bowden::progress::Quiet;
+use bowden_core::outcome::Failure;
+use bowden_core::progress::Quiet;
+use bowden_host_link::investigate::limits::Wishes;
+use bowden_host_link::investigate::{Dialog, Setup, investigate};
+use bowden_host_link::sim::SimTransport;
+use bowden_host_link::{Client, Transport};
 use common::bowden;
 use serde_json::Value;
 use tempfile::TempDir;

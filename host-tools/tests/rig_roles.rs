@@ -6,9 +6,9 @@ use std::path::Path;
 use bowden::commands::{
     diagnose::DiagnoseArguments, fit::FitArguments, replay::ReplayArguments, simulate::SimulateArguments,
 };
-use bowden::outcome::FailureClass;
-use bowden::recording::Recording;
-use bowden::rig::Rig;
+use bowden_core::outcome::FailureClass;
+use bowden_core::recording::Recording;
+use bowden_core::rig::Rig;
 use bowden_model::channel::Channel;
 use clap::Parser;
 

@@ -6,12 +6,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use bowden::fit::recalibrate::recalibrate;
-use bowden::progress::Quiet;
-use bowden::recording::{ReadOptions, Recording};
-use bowden::rig::{Assignment, Rig};
-use bowden::simulate::{Motion, Reference, RunOptions, run};
-use bowden::study::LoadedStudy;
+use bowden_core::fit::recalibrate::recalibrate;
+use bowden_core::progress::Quiet;
+use bowden_core::recording::{ReadOptions, Recording};
+use bowden_core::rig::{Assignment, Rig};
+use bowden_core::simulate::{Motion, Reference, RunOptions, run};
+use bowden_core::study::LoadedStudy;
 use common::bowden;
 
 /// What a bench really is, beside what its rig file states.
@@ -22,7 +22,7 @@ struct Truth {
 }
 
 fn rig_text() -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rigs/bench.toml")).unwrap()
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("core/tests/rigs/bench.toml")).unwrap()
 }
 
 /// Records benches that differ from `rig.toml` into a folder.
@@ -101,8 +101,9 @@ set = { "load.mass_kg" = 1.5 }
         let found = fitted(name, bench);
         assert!((found / truth - 1.0).abs() < 0.03, "{name} of bench {bench:?}: {found} for {truth}");
     }
-    let shared =
-        |p: &&bowden::fit::recalibrate::FittedParameter| p.parameter.to_string() == "tendon.pretension_n";
+    let shared = |p: &&bowden_core::fit::recalibrate::FittedParameter| {
+        p.parameter.to_string() == "tendon.pretension_n"
+    };
     assert_eq!(result.parameters.iter().filter(shared).count(), 2, "every bench has its own, none is shared");
 
     let (status, text, errors) = bowden(folder, &["fit", "study.toml", "--out", "fitted"]);
@@ -236,7 +237,7 @@ fn the_servos_study_names_the_friction_of_its_gear() {
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/xl330-pendulum/study.toml");
     let study = LoadedStudy::load(&study).unwrap().study;
     assert_eq!((study.benches.len(), study.recordings.len()), (1, 11));
-    let diagnosis = bowden::diagnose::diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
+    let diagnosis = bowden_core::diagnose::diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
     let named: Vec<&str> = diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
     assert_eq!(named, ["gear_load_friction"]);
     // 0.1583 and 0.1106 rad on the four recordings that took no part.

@@ -6,7 +6,7 @@ pub mod recovery;
 
 use std::path::PathBuf;
 
-use bowden::recording::Recording;
+use bowden_core::recording::Recording;
 use bowden_model::channel::Channel;
 
 /// Folder of real and concealed recordings beside the workspace, if it is there.

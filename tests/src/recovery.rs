@@ -1,11 +1,11 @@
 //! One concealed effect of the virtual bench, fitted by the same effect of bowden's model.
 
-use bowden::fit::calibrated::recalibrated;
-use bowden::fit::free::Free;
-use bowden::fit::objective::{Objective, Part};
-use bowden::fit::solver::solve;
-use bowden::joint_model::JointModel;
-use bowden::rig::Rig;
+use bowden_core::fit::calibrated::recalibrated;
+use bowden_core::fit::free::Free;
+use bowden_core::fit::objective::{Objective, Part};
+use bowden_core::fit::solver::solve;
+use bowden_core::joint_model::JointModel;
+use bowden_core::rig::Rig;
 use bowden_model::effect::{ActiveEffect, Target};
 use bowden_model::effects;
 use virtual_bench::{BenchConfig, ConcealedEffect, Motion, MotionKind, nominal_rig_toml, record};

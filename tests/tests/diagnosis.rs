@@ -5,13 +5,13 @@
 
 use std::time::Instant;
 
-use bowden::diagnose::diagnose;
-use bowden::diagnose::verdict::{Diagnosis, NamedEffect, Verdict};
-use bowden::progress::Quiet;
-use bowden::recording::Recording;
-use bowden::replay;
-use bowden::rig::{Rig, RigDocument};
-use bowden::study::Study;
+use bowden_core::diagnose::diagnose;
+use bowden_core::diagnose::verdict::{Diagnosis, NamedEffect, Verdict};
+use bowden_core::progress::Quiet;
+use bowden_core::recording::Recording;
+use bowden_core::replay;
+use bowden_core::rig::{Rig, RigDocument};
+use bowden_core::study::Study;
 use bowden_model::channel::Channel;
 use bowden_model::effects::find;
 use bowden_model::parameters::{NOMINAL_PARAMETERS, UNITS_OF_STRENGTH};

@@ -1,11 +1,11 @@
 //! From a bench to a result: forward run and replay of the same rig, and fits to recordings of another reality.
 
-use bowden::fit::recalibrate::recalibrate;
-use bowden::progress::Quiet;
-use bowden::replay;
-use bowden::rig::Rig;
-use bowden::simulate::{Motion, Reference, RunOptions, run};
-use bowden::study::Study;
+use bowden_core::fit::recalibrate::recalibrate;
+use bowden_core::progress::Quiet;
+use bowden_core::replay;
+use bowden_core::rig::Rig;
+use bowden_core::simulate::{Motion, Reference, RunOptions, run};
+use bowden_core::study::Study;
 use bowden_model::channel::Channel;
 use bowden_tests::{recording_of, rms_difference};
 use virtual_bench::{Case, MotionKind, Parameter, nominal_rig_toml};

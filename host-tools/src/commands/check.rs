@@ -3,11 +3,12 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::recording::{Column, ReadOptions, Recording};
+use bowden_core::rig::Rig;
+use bowden_core::study::{LoadedStudy, Role, Study};
+
 use super::{load_study, outcome_of, print};
-use crate::outcome::{Failure, Outcome};
-use crate::recording::{Column, ReadOptions, Recording};
-use crate::rig::Rig;
-use crate::study::{LoadedStudy, Role, Study};
 
 /// Arguments of `bowden check`.
 #[derive(Clone, Debug, clap::Args)]
@@ -118,5 +119,5 @@ fn describe(recording: &Recording) -> String {
     if !unknown.is_empty() {
         let _ = write!(text, "; kept and not interpreted: {}", unknown.join(", "));
     }
-    crate::outcome::one_line(&text)
+    bowden_core::outcome::one_line(&text)
 }

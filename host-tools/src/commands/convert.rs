@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::recording::{Format, ReadOptions, Recording};
+
 use super::outcome_of;
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::recording::{Format, ReadOptions, Recording};
 
 /// Arguments of `bowden convert`.
 #[derive(Clone, Debug, clap::Args)]

@@ -2,17 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
+use bowden_core::diagnose::diagnose;
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::progress::Progress;
+use bowden_core::report::files::{REPORT, RESULT, earlier_experiments, rig_files, save};
+use bowden_core::rig::RigDocument;
+use bowden_core::study::LoadedStudy;
 use bowden_model::effects::CATALOGUE;
 
 use super::{load_study, outcome_of, print};
-use crate::diagnose::diagnose;
 use crate::interrupt;
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::progress::{Progress, UntilInterrupted};
-use crate::report::files::{REPORT, RESULT, earlier_experiments, rig_files, save};
-use crate::rig::RigDocument;
-use crate::study::LoadedStudy;
+use crate::progress::UntilInterrupted;
 
 /// Arguments of `bowden diagnose`.
 #[derive(Clone, Debug, clap::Args)]

@@ -3,16 +3,16 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::recording::{Format, RowWriter};
+use bowden_host_link::conversion::{Conversion, columns};
+use bowden_host_link::recorder::tick_time_s;
+use bowden_host_link::{Client, LinkError, ParameterSet, PortArguments};
 use bowden_link::message::{Boot, Goal, Refusal, Status};
 use bowden_link::{Limit, Sample};
 
 use super::print;
-use crate::link::conversion::{Conversion, columns};
-use crate::link::recorder::tick_time_s;
-use crate::link::{Client, LinkError, ParameterSet, PortArguments};
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::recording::{Format, RowWriter};
 
 /// Arguments of `bowden faults`.
 #[derive(Clone, Debug, clap::Args)]
@@ -50,7 +50,7 @@ impl FaultsArguments {
         let _ = writeln!(text, "firmware {} on {}, started by: {boot}", greeting.firmware, greeting.board);
         let panic = client.panic_text()?;
         if !panic.is_empty() {
-            let _ = writeln!(text, "panic before that: {}", crate::outcome::one_line(&panic));
+            let _ = writeln!(text, "panic before that: {}", bowden_core::outcome::one_line(&panic));
         }
         let _ = writeln!(text, "samples of the last ticks: {}", status.snapshot);
         let mut outcome = Outcome::done();

@@ -3,13 +3,14 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use bowden_core::fit::objective::Series;
+use bowden_core::fit::recalibrate::{FittedParameter, Recalibration, recalibrate};
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::progress::Progress;
+use bowden_core::study::{LoadedStudy, Study};
+
 use super::{all_paths, load_study, outcome_of, print};
-use crate::fit::objective::Series;
-use crate::fit::recalibrate::{FittedParameter, Recalibration, recalibrate};
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::progress::Progress;
-use crate::study::{LoadedStudy, Study};
 
 /// Arguments of `bowden fit`.
 #[derive(Clone, Debug, clap::Args)]

@@ -6,15 +6,17 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::Duration;
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::progress::Progress;
+use bowden_core::rig::Rig;
+use bowden_host_link::PortArguments;
+use bowden_host_link::investigate::limits::Wishes;
+use bowden_host_link::investigate::{Dialog, Setup, investigate};
+
 use super::print;
 use crate::interrupt;
-use crate::investigate::limits::Wishes;
-use crate::investigate::{Dialog, Setup, investigate};
-use crate::link::PortArguments;
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::progress::{Progress, UntilInterrupted};
-use crate::rig::Rig;
+use crate::progress::UntilInterrupted;
 
 /// Time between two looks whether the user pressed Ctrl-C instead of answering.
 const LOOK_INTERVAL: Duration = Duration::from_millis(50);

@@ -5,13 +5,14 @@ mod table;
 use std::io::Write;
 use std::path::PathBuf;
 
-use super::print;
-use crate::link::from_rig::Transfer;
-use crate::link::{Client, ParameterSet, PortArguments};
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::rig::Rig;
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::rig::Rig;
+use bowden_host_link::from_rig::Transfer;
+use bowden_host_link::{Client, ParameterSet, PortArguments};
 use table::TableArguments;
+
+use super::print;
 
 /// Arguments of `bowden params`.
 #[derive(Clone, Debug, clap::Args)]

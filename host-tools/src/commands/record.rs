@@ -2,17 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::progress::Progress;
+use bowden_core::recording::Format;
+use bowden_host_link::capture::{Capture, PROGRESS_STEPS, save_parameters, sidecar};
+use bowden_host_link::course::{Course, CourseArguments, run_seconds};
+use bowden_host_link::recorder::Tally;
+use bowden_host_link::rig_file::{self, Weight};
+use bowden_host_link::session::{RunEnd, Session};
+use bowden_host_link::{LinkError, ParameterSet, PortArguments};
+
 use crate::interrupt;
-use crate::link::capture::{Capture, PROGRESS_STEPS, save_parameters, sidecar};
-use crate::link::course::{Course, CourseArguments, run_seconds};
-use crate::link::recorder::Tally;
-use crate::link::rig_file::{self, Weight};
-use crate::link::session::{RunEnd, Session};
-use crate::link::{LinkError, ParameterSet, PortArguments};
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::progress::Progress;
-use crate::recording::Format;
 
 /// Arguments of `bowden record`.
 #[derive(Clone, Debug, clap::Args)]

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::recording::{Format, Recording};
+use bowden_core::rig::{Assignment, Rig};
+
 use super::outcome_of;
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::recording::{Format, Recording};
-use crate::rig::{Assignment, Rig};
 
 /// Arguments of `bowden replay`.
 #[derive(Clone, Debug, clap::Args)]
@@ -39,10 +40,10 @@ impl ReplayArguments {
     /// Replays the recording and writes the prediction.
     ///
     /// # Errors
-    /// See [`ReplayArguments::prepare`] and [`crate::replay::predict`].
+    /// See [`ReplayArguments::prepare`] and [`bowden_core::replay::predict`].
     pub fn run(&self) -> Result<Outcome, Failure> {
         let task = self.prepare()?;
-        crate::replay::predict(&task.rig, &task.recording)?.save(&task.out)?;
+        bowden_core::replay::predict(&task.rig, &task.recording)?.save(&task.out)?;
         Ok(outcome_of([&task.recording]))
     }
 

@@ -2,15 +2,15 @@
 
 use std::ops::ControlFlow;
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_host_link::course::{CourseArguments, run_seconds};
+use bowden_host_link::recorder::tick_time_s;
+use bowden_host_link::session::{RunEnd, RunTick, Session};
+use bowden_host_link::{LinkError, PortArguments};
 use bowden_link::Limit;
 
 use super::print;
 use crate::interrupt;
-use crate::link::course::{CourseArguments, run_seconds};
-use crate::link::recorder::tick_time_s;
-use crate::link::session::{RunEnd, RunTick, Session};
-use crate::link::{LinkError, PortArguments};
-use crate::outcome::{Failure, Outcome};
 
 /// Arguments of `bowden send`.
 #[derive(Clone, Debug, clap::Args)]
@@ -81,7 +81,7 @@ impl SendArguments {
     fn follow(&self, course: &CourseArguments, seconds: Option<f64>) -> Result<Outcome, Failure> {
         let (mode, course) = (course.mode(), course.course()?);
         let mut session = Session::new(self.port.connect()?)?;
-        let conversion = crate::link::conversion::Conversion::new(session.parameters())?;
+        let conversion = bowden_host_link::conversion::Conversion::new(session.parameters())?;
         let mut first = None;
         let mut next_line_s = 0.0;
         let end = session.run(mode, &course, &interrupt::requested, &mut |tick: &RunTick| {
@@ -109,7 +109,7 @@ impl SendArguments {
 }
 
 /// Where the joint is.
-fn line(run_s: f64, tick: &RunTick, conversion: &crate::link::conversion::Conversion) -> String {
+fn line(run_s: f64, tick: &RunTick, conversion: &bowden_host_link::conversion::Conversion) -> String {
     let sample = &tick.sample;
     let [theta_in_rad, theta_out_rad] = conversion.angles_rad(sample);
     let [f1, f2, f3, f4] = conversion.tensions_n(sample);

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_core::recording::{Format, ReadOptions, Recording};
+use bowden_core::rig::Rig;
+use bowden_core::simulate::{Motion, Reference, RunOptions, run};
 use bowden_model::channel::Channel;
 
 use super::outcome_of;
-use crate::outcome::{Failure, Outcome};
-use crate::output;
-use crate::recording::{Format, ReadOptions, Recording};
-use crate::rig::Rig;
-use crate::simulate::{Motion, Reference, RunOptions, run};
 
 /// Arguments of `bowden simulate`.
 #[derive(Clone, Debug, clap::Args)]

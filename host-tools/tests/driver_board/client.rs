@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bowden::link::{CommsError, LinkError, ParameterSet};
+use bowden_host_link::{CommsError, LinkError, ParameterSet};
 use bowden_link::message::{Goal, Mode, Refusal};
 use bowden_link::{SCHEMA, State, ToBoard};
 

@@ -3,11 +3,11 @@
 use std::fs;
 use std::time::Duration;
 
-use bowden::link::from_rig::{Transfer, Unused};
-use bowden::link::sim::SimTransport;
-use bowden::link::{Client, ParameterSet};
-use bowden::outcome::FailureClass;
-use bowden::rig::Rig;
+use bowden_core::outcome::FailureClass;
+use bowden_core::rig::Rig;
+use bowden_host_link::from_rig::{Transfer, Unused};
+use bowden_host_link::sim::SimTransport;
+use bowden_host_link::{Client, ParameterSet};
 use bowden_link::ToBoard;
 use tempfile::TempDir;
 

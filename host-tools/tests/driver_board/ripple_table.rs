@@ -5,12 +5,12 @@ use std::fmt::Write;
 use std::fs;
 use std::time::Duration;
 
-use bowden::link::from_rig::Transfer;
-use bowden::link::ripple_table::{Sampled, download, largest_nm, to_csv};
-use bowden::link::sim::SimTransport;
-use bowden::link::{Client, LinkError, ParameterSet};
-use bowden::outcome::FailureClass;
-use bowden::rig::Rig;
+use bowden_core::outcome::FailureClass;
+use bowden_core::rig::Rig;
+use bowden_host_link::from_rig::Transfer;
+use bowden_host_link::ripple_table::{Sampled, download, largest_nm, to_csv};
+use bowden_host_link::sim::SimTransport;
+use bowden_host_link::{Client, LinkError, ParameterSet};
 use bowden_link::message::{Goal, Mode, Refusal, TableReport};
 use bowden_link::{State, ToBoard};
 

@@ -3,8 +3,8 @@
 use std::cell::Cell;
 use std::ops::ControlFlow;
 
-use bowden::link::course::{Course, Track};
-use bowden::link::{CommsError, LinkError, RunEnd, Session};
+use bowden_host_link::course::{Course, Track};
+use bowden_host_link::{CommsError, LinkError, RunEnd, Session};
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{Fault, State, ToBoard};
 

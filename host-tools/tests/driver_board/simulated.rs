@@ -6,10 +6,10 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use bowden::link::course::{Course, Track};
-use bowden::link::sim::SimTransport;
-use bowden::link::{Client, RunEnd, Session};
-use bowden::recording::{Column, ReadOptions, Recording};
+use bowden_core::recording::{Column, ReadOptions, Recording};
+use bowden_host_link::course::{Course, Track};
+use bowden_host_link::sim::SimTransport;
+use bowden_host_link::{Client, RunEnd, Session};
 use bowden_link::State;
 use bowden_link::message::{Goal, Mode};
 use bowden_model::channel::Channel;

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::process::{Child, Command};
 use std::time::Duration;
 
-use bowden::link::client::DEFAULT_TIMEOUT;
-use bowden::recording::{Column, ReadOptions, Recording};
+use bowden_core::recording::{Column, ReadOptions, Recording};
+use bowden_host_link::client::DEFAULT_TIMEOUT;
 use bowden_link::message::Goal;
 use bowden_link::{Fault, FaultRecord, State, ToBoard};
 use bowden_model::channel::Channel;

@@ -5,7 +5,7 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-use bowden::link::{Client, LinkError, Transport};
+use bowden_host_link::{Client, LinkError, Transport};
 
 use crate::fake::{Fake, PERIOD_NS};
 

@@ -43,7 +43,7 @@ const BENCHES: [(&str, &str, &str); 3] = [
         "realtime",
         "the virtual bench: simulated milliseconds a second; 1 Kitem/s is real time",
     ),
-    ("bowden", "reconstruction", "replay: what reconstructing the input angle gains over filtering it"),
+    ("bowden-core", "reconstruction", "replay: what reconstructing the input angle gains over filtering it"),
 ];
 
 /// Runs the benchmarks, then reads the figures of the release images.

@@ -66,7 +66,7 @@ fn run_real(options: &Options) -> Result<(), String> {
             data.display()
         ));
     }
-    let example = ["--package", "bowden", "--example", "real_recordings"];
+    let example = ["--package", "bowden-core", "--example", "real_recordings"];
     process::run(cargo(&["build", "--release"]).args(example), &[0])?;
     let mut command = real(options, &data, &built("release/examples", "real_recordings")?);
     let status = command.status().map_err(|error| process::unstarted(&command, &error))?;

@@ -318,9 +318,10 @@ pub fn true_rig(case: &Case) -> String {
 
 #[cfg(test)]
 mod tests {
+    use bowden_core::rig::Rig;
+
     use super::*;
     use crate::prove::plan::{Group, plans};
-    use bowden::rig::Rig;
 
     #[test]
     fn every_true_rig_is_a_rig_file_with_the_effects_that_are_left() {

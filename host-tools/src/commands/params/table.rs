@@ -5,13 +5,13 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use bowden_control::correction::ripple_table::{PERIOD_RAD, RippleTable};
+use bowden_core::outcome::Failure;
+use bowden_core::output;
+use bowden_host_link::ripple_table::{Sampled, download, largest_nm, to_csv};
+use bowden_host_link::{Client, ParameterSet};
 use bowden_link::message::TableReport;
 
 use super::super::print;
-use crate::link::ripple_table::{Sampled, download, largest_nm, to_csv};
-use crate::link::{Client, ParameterSet};
-use crate::outcome::Failure;
-use crate::output;
 
 /// Switch and limit of the table.
 const ENABLE: &str = "correction.ripple_table.enable";

@@ -1,0 +1,153 @@
+//! Scores on recordings of real benches, held out recording by recording.
+//!
+//! A score counts only for a recording that the fit has not seen: every recording is left out once, all parameters are
+//! fitted to the others, and the left-out one is replayed. The physics itself was chosen by people who had seen all
+//! recordings; `docs/real-recordings.md` says how far that reaches.
+
+pub mod band_damper;
+pub mod cable_tool;
+pub mod cogging_motor;
+pub mod diagnosed;
+pub mod direct_drive;
+pub mod joint_fit;
+pub mod late;
+pub mod page;
+pub mod servo_pendulum;
+mod table;
+
+use std::fmt;
+use std::path::Path;
+
+use crate::outcome::Failure;
+use crate::rig::Rig;
+
+pub use table::Table;
+
+/// What a data set demands of the physics that is meant to explain it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// What is scored, with its unit.
+    pub quantity: &'static str,
+    /// Score over all held-out recordings.
+    pub score: f64,
+    /// Largest score that passes.
+    pub limit: f64,
+}
+
+impl Mark {
+    /// Whether the score passes; a score that is not a number does not.
+    #[must_use]
+    pub fn met(&self) -> bool {
+        self.score <= self.limit
+    }
+}
+
+impl fmt::Display for Mark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = if self.met() { "met" } else { "MISSED" };
+        write!(f, "{}: {:.4}, mark {:.4}: {verdict}", self.quantity, self.score, self.limit)
+    }
+}
+
+/// Root of the mean square.
+#[must_use]
+pub fn root_mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value * value;
+        count += 1.0;
+    }
+    f64::sqrt(sum / count)
+}
+
+/// Mean.
+#[must_use]
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value;
+        count += 1.0;
+    }
+    sum / count
+}
+
+/// Standard deviation: root mean square about the mean.
+#[must_use]
+pub fn standard_deviation(values: &[f64]) -> f64 {
+    let middle = mean(values.iter().copied());
+    root_mean_square(values.iter().map(|value| value - middle))
+}
+
+/// A rig file of `rigs/`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RigFile {
+    /// Its name.
+    pub name: &'static str,
+    /// What it holds.
+    pub text: &'static str,
+}
+
+impl RigFile {
+    /// The rig.
+    ///
+    /// # Errors
+    /// When the text is no rig.
+    pub fn parse(self) -> Result<Rig, Failure> {
+        Rig::parse(self.text, &format!("rigs/{}", self.name))
+    }
+}
+
+/// The [`RigFile`] of a name.
+macro_rules! rig_file {
+    ($name:literal) => {
+        $crate::marks::RigFile { name: $name, text: include_str!(concat!("../../../rigs/", $name)) }
+    };
+}
+use rig_file;
+
+/// The reason for a file of a data set that cannot be used.
+fn unusable(path: &Path, reason: impl fmt::Display) -> Failure {
+    Failure::bad_input(format!("{}: {reason}; name the folder that holds the data sets", path.display()))
+}
+
+/// Names of the recordings in the manifest of a data set, in its order.
+///
+/// # Errors
+/// When the manifest cannot be read or names none.
+pub fn listed_recordings(folder: &Path) -> Result<Vec<String>, Failure> {
+    let path = folder.join("manifest.csv");
+    let mut reader = csv::Reader::from_path(&path).map_err(|error| unusable(&path, error))?;
+    let mut names = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(|error| unusable(&path, error))?;
+        names.extend(row.get(0).and_then(|file| file.strip_suffix(".csv")).map(str::to_owned));
+    }
+    names.sort_unstable();
+    if names.is_empty() { Err(unusable(&path, "lists no recordings")) } else { Ok(names) }
+}
+
+/// Columns of a table of numbers, in the order of `names`.
+///
+/// # Errors
+/// When the file cannot be read, lacks a column, or holds something else than a number there.
+pub fn columns<const N: usize>(path: &Path, names: [&str; N]) -> Result<[Vec<f64>; N], Failure> {
+    let mut reader = csv::Reader::from_path(path).map_err(|error| unusable(path, error))?;
+    let header = reader.headers().map_err(|error| unusable(path, error))?.clone();
+    let mut places = [0; N];
+    for (place, name) in places.iter_mut().zip(names) {
+        *place = header
+            .iter()
+            .position(|there| there == name)
+            .ok_or_else(|| unusable(path, format!("no column `{name}`")))?;
+    }
+    let mut columns = [const { Vec::new() }; N];
+    for (number, row) in reader.records().enumerate() {
+        let row = row.map_err(|error| unusable(path, error))?;
+        for ((column, place), name) in columns.iter_mut().zip(places).zip(names) {
+            let value = row.get(place).and_then(|cell| cell.parse().ok());
+            let nothing = || unusable(path, format!("line {}: {name}: no number", number + 2));
+            column.push(value.ok_or_else(nothing)?);
+        }
+    }
+    Ok(columns)
+}
