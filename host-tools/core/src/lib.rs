@@ -7,7 +7,6 @@
 pub mod diagnose;
 pub mod fit;
 pub mod joint_model;
-pub mod marks;
 pub mod outcome;
 pub mod output;
 pub mod progress;

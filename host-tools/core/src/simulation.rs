@@ -481,7 +481,7 @@ impl<'a> Sampler<'a> {
 }
 
 /// Values of one sensor, sample by sample.
-pub(crate) fn through(
+pub fn through(
     t_s: &[f64],
     values: &[f64],
     mut sensor: impl FnMut(&mut EffectStates, &mut SensorPort),

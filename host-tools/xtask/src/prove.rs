@@ -66,9 +66,8 @@ fn run_real(options: &Options) -> Result<(), String> {
             data.display()
         ));
     }
-    let example = ["--package", "bowden-core", "--example", "real_recordings"];
-    process::run(cargo(&["build", "--release"]).args(example), &[0])?;
-    let mut command = real(options, &data, &built("release/examples", "real_recordings")?);
+    process::run(&mut cargo(&["build", "--release", "--package", "bowden-real-data"]), &[0])?;
+    let mut command = real(options, &data, &built("release", "real_recordings")?);
     let status = command.status().map_err(|error| process::unstarted(&command, &error))?;
     match status.code() {
         Some(0) => Ok(()),

@@ -5,13 +5,13 @@
 
 use std::path::Path;
 
+use bowden_core::joint_model::JointModel;
+use bowden_core::outcome::Failure;
 use bowden_model::channel::Channel;
 
 use super::diagnosed::Case;
 use super::joint_fit::{Knob, Run, fit, leave_out};
 use super::{Mark, RigFile, Table, listed_recordings, mean, rig_file};
-use crate::joint_model::JointModel;
-use crate::outcome::Failure;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "bam-xl330-pendulum";

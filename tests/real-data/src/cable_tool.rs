@@ -6,6 +6,9 @@
 
 use std::path::Path;
 
+use bowden_core::joint_model::JointModel;
+use bowden_core::outcome::Failure;
+use bowden_core::recording::ColumnSource;
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
@@ -13,9 +16,6 @@ use bowden_model::effects::find;
 use super::diagnosed::Case;
 use super::joint_fit::{Fitted, Knob, Run, fit, leave_out, rmse_of};
 use super::{Mark, RigFile, Table, listed_recordings, rig_file, root_mean_square};
-use crate::joint_model::JointModel;
-use crate::outcome::Failure;
-use crate::recording::ColumnSource;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "davinci-cable-tool";

@@ -7,6 +7,8 @@
 
 use std::path::Path;
 
+use bowden_core::joint_model::JointModel;
+use bowden_core::outcome::Failure;
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Target};
 use bowden_model::effects::find;
@@ -18,8 +20,6 @@ use super::late::late;
 use super::{
     Mark, RigFile, Table, columns, listed_recordings, mean, rig_file, root_mean_square, standard_deviation,
 };
-use crate::joint_model::JointModel;
-use crate::outcome::Failure;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "band-friction-damper";

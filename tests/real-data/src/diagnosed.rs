@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use bowden_core::diagnose::diagnose;
+use bowden_core::diagnose::verdict::Diagnosis;
+use bowden_core::outcome::Failure;
+use bowden_core::progress::Quiet;
+use bowden_core::recording::Recording;
+use bowden_core::study::Study;
+
 use super::{RigFile, Table};
-use crate::diagnose::diagnose;
-use crate::diagnose::verdict::Diagnosis;
-use crate::outcome::Failure;
-use crate::progress::Quiet;
-use crate::recording::Recording;
-use crate::study::Study;
 
 /// A diagnosis that is to be made: what `bowden diagnose` is given.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 
 use std::path::PathBuf;
 
-use bowden_core::marks::{Mark, band_damper, cable_tool, cogging_motor, direct_drive, mean, servo_pendulum};
+use bowden_real_data::{Mark, band_damper, cable_tool, cogging_motor, direct_drive, mean, servo_pendulum};
 
 /// Folder of the data set, if it is there.
 fn data(folder: &str) -> Option<PathBuf> {
@@ -96,7 +96,7 @@ fn a_quasi_direct_drive_swings_as_its_reported_torque_says() {
     assert_eq!(runs[0].name, SWING_UP);
     let errors = |physics, taken| errors_rad(&runs, &models(&runs, physics, taken).unwrap()).unwrap();
     let dry = errors(direct_drive::MARKED, Taken::Friction);
-    let total = bowden_core::marks::root_mean_square(dry.iter().copied());
+    let total = bowden_real_data::root_mean_square(dry.iter().copied());
     within(&Mark { quantity: "angle, rad", score: total, limit: direct_drive::LIMIT_RAD });
     // The friction of the other recording halves the error of the swing-up.
     assert!(dry[0] < 0.6 * errors(Physics::Frictionless, Taken::Friction)[0], "{dry:?}");
@@ -142,7 +142,9 @@ fn the_hysteresis_of_a_band_damper_is_predicted_from_its_displacement() {
 fn the_rigs_of_the_servo_differ_in_name_and_gain_alone() {
     let rig = |gain: u32| -> Vec<String> {
         let path: PathBuf =
-            [env!("CARGO_MANIFEST_DIR"), "..", "rigs", &format!("xl330-kp{gain}.toml")].iter().collect();
+            [env!("CARGO_MANIFEST_DIR"), "..", "..", "host-tools", "rigs", &format!("xl330-kp{gain}.toml")]
+                .iter()
+                .collect();
         std::fs::read_to_string(path).unwrap().lines().map(str::to_owned).collect()
     };
     let first = rig(100);

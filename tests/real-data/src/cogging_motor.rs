@@ -9,6 +9,8 @@
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
+use bowden_core::outcome::Failure;
+use bowden_core::reconstruct::Motion;
 use bowden_model::effect::{ActiveEffect, EffectState, MAX_STATE, MotorPort};
 use bowden_model::effects::find;
 use nalgebra::{DMatrix, DVector};
@@ -20,8 +22,6 @@ use super::{
     Mark, RigFile, Table, columns, listed_recordings, mean, rig_file, root_mean_square, standard_deviation,
     unusable,
 };
-use crate::outcome::Failure;
-use crate::reconstruct::Motion;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "odrive-cogging";

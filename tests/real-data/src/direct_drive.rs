@@ -6,6 +6,8 @@
 
 use std::path::Path;
 
+use bowden_core::joint_model::JointModel;
+use bowden_core::outcome::Failure;
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
@@ -15,8 +17,6 @@ use rayon::prelude::*;
 use super::diagnosed::Case;
 use super::joint_fit::{Knob, Run, adapted, fit, rmse_of};
 use super::{Mark, RigFile, Table, columns, listed_recordings, mean, rig_file, root_mean_square};
-use crate::joint_model::JointModel;
-use crate::outcome::Failure;
 
 /// Folder of the data set.
 pub const FOLDER: &str = "dfki-qdd-pendulum";

@@ -1,6 +1,6 @@
 //! Scores the simulation on recordings of real benches, held out by recording, and diagnoses them.
 //!
-//! `cargo run --release -p bowden-core --example real_recordings -- [DATA_DIR] [--only FOLDER]... [--page FILE]`, or
+//! `cargo run --release -p bowden-real-data -- [DATA_DIR] [--only FOLDER]... [--page FILE]`, or
 //! `cargo xtask prove --real`: `DATA_DIR` holds one folder a data set; without it the variable `BOWDEN_DATA` names it, or
 //! it is `shared/data` beside the workspace. `--page` puts what a complete run prints into a page, between its two
 //! marker lines. Exit status: 0 all marks met, 1 a mark missed, 2 data missing or unusable.
@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bowden_core::marks::page::with_printed;
-use bowden_core::marks::{Mark, band_damper, cable_tool, cogging_motor, direct_drive, servo_pendulum};
 use bowden_core::outcome::Failure;
+use bowden_real_data::page::with_printed;
+use bowden_real_data::{Mark, band_damper, cable_tool, cogging_motor, direct_drive, servo_pendulum};
 use clap::Parser;
 
 /// Score the simulation on recordings of real benches, held out by recording, and diagnose them

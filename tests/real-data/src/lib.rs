@@ -2,7 +2,9 @@
 //!
 //! A score counts only for a recording that the fit has not seen: every recording is left out once, all parameters are
 //! fitted to the others, and the left-out one is replayed. The physics itself was chosen by people who had seen all
-//! recordings; `docs/real-recordings.md` says how far that reaches.
+//! recordings; `host-tools/docs/real-recordings.md` says how far that reaches.
+
+#![forbid(unsafe_code)]
 
 pub mod band_damper;
 pub mod cable_tool;
@@ -18,8 +20,8 @@ mod table;
 use std::fmt;
 use std::path::Path;
 
-use crate::outcome::Failure;
-use crate::rig::Rig;
+use bowden_core::outcome::Failure;
+use bowden_core::rig::Rig;
 
 pub use table::Table;
 
@@ -100,7 +102,7 @@ impl RigFile {
 /// The [`RigFile`] of a name.
 macro_rules! rig_file {
     ($name:literal) => {
-        $crate::marks::RigFile { name: $name, text: include_str!(concat!("../../../rigs/", $name)) }
+        $crate::RigFile { name: $name, text: include_str!(concat!("../../../host-tools/rigs/", $name)) }
     };
 }
 use rig_file;

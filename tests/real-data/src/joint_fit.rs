@@ -6,6 +6,11 @@
 
 use std::path::Path;
 
+use bowden_core::fit::free::Free;
+use bowden_core::joint_model::JointModel;
+use bowden_core::outcome::Failure;
+use bowden_core::rig::Rig;
+use bowden_core::simulation::{ReplayInput, replay};
 use bowden_model::channel::Channel;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
@@ -13,11 +18,6 @@ use nalgebra::{DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::{mean, root_mean_square};
-use crate::fit::free::Free;
-use crate::joint_model::JointModel;
-use crate::outcome::Failure;
-use crate::rig::Rig;
-use crate::simulation::{ReplayInput, replay};
 
 /// Recorded values of one output and what a difference of one mark is.
 #[derive(Clone, Debug)]

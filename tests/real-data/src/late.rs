@@ -1,9 +1,8 @@
 //! Values as a sensor behind a first-order filter shows them.
 
+use bowden_core::simulation::through;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
-
-use crate::simulation::through;
 
 /// The values at `t_s` as `sensor_lag` with time constant `lag_s` shows them; as they are for no lag.
 #[must_use]
