@@ -2,11 +2,14 @@
 
 pub mod check;
 pub mod convert;
+mod course;
 pub mod diagnose;
 pub mod faults;
 pub mod fit;
 pub mod investigate;
+mod limits;
 pub mod params;
+mod port;
 pub mod record;
 pub mod replay;
 pub mod send;

@@ -59,43 +59,23 @@ const SIM_CONCEALS: &str = "sim:";
 /// Name that stands for the one board on USB.
 pub const AUTO: &str = "auto";
 
-/// Arguments that say which board.
-#[derive(Clone, Debug, clap::Args)]
-pub struct PortArguments {
-    /// Serial port of the board, `auto` for the one on USB, or `sim` for a simulated board with a simulated joint,
-    /// switched on anew each time; `sim:joint_backlash:0.8,seed=7` for one that conceals something
-    #[arg(long, value_name = "PATH|auto|sim")]
-    port: String,
-    /// How long an answer of the board is waited for, s
-    #[arg(long, value_name = "SECONDS", default_value = "1.5", value_parser = timeout)]
-    timeout: Duration,
-}
-
-impl PortArguments {
-    /// Opens the port and greets the board.
-    ///
-    /// # Errors
-    /// See [`serial::SerialTransport::open`], [`serial::find`] and [`Client::connect`].
-    pub fn connect(&self) -> Result<Client, LinkError> {
-        if let Some(list) = self.port.strip_prefix(SIM_CONCEALS) {
-            let transport = sim::SimTransport::with(&sim::Concealed::parse(list)?)?;
-            return Client::connect(Box::new(transport), SIM, self.timeout);
+/// Opens a port and greets the board: a serial port, [`AUTO`], or [`SIM`] with what the simulated joint conceals behind a colon.
+/// An answer of the board is waited for as long as `timeout`.
+///
+/// # Errors
+/// See [`serial::SerialTransport::open`], [`serial::find`], [`sim::Concealed::parse`] and [`Client::connect`].
+pub fn connect(port: &str, timeout: Duration) -> Result<Client, LinkError> {
+    if let Some(list) = port.strip_prefix(SIM_CONCEALS) {
+        let transport = sim::SimTransport::with(&sim::Concealed::parse(list)?)?;
+        return Client::connect(Box::new(transport), SIM, timeout);
+    }
+    let (transport, name): (Box<dyn Transport>, String) = match port {
+        SIM => (Box::new(sim::SimTransport::new()), SIM.to_owned()),
+        AUTO => {
+            let path = serial::find()?;
+            (Box::new(serial::SerialTransport::open(&path)?), path)
         }
-        let (transport, name): (Box<dyn Transport>, String) = match self.port.as_str() {
-            SIM => (Box::new(sim::SimTransport::new()), SIM.to_owned()),
-            AUTO => {
-                let path = serial::find()?;
-                (Box::new(serial::SerialTransport::open(&path)?), path)
-            }
-            path => (Box::new(serial::SerialTransport::open(path)?), path.to_owned()),
-        };
-        Client::connect(transport, name, self.timeout)
-    }
-}
-
-fn timeout(text: &str) -> Result<Duration, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.05..=600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
-        _ => Err("allowed 0.05 to 600 s".to_owned()),
-    }
+        path => (Box::new(serial::SerialTransport::open(path)?), path.to_owned()),
+    };
+    Client::connect(transport, name, timeout)
 }

@@ -8,10 +8,11 @@ use bowden_core::output;
 use bowden_core::recording::{Format, RowWriter};
 use bowden_host_link::conversion::{Conversion, columns};
 use bowden_host_link::recorder::tick_time_s;
-use bowden_host_link::{Client, LinkError, ParameterSet, PortArguments};
+use bowden_host_link::{Client, LinkError, ParameterSet};
 use bowden_link::message::{Boot, Goal, Refusal, Status};
 use bowden_link::{Limit, Sample};
 
+use super::port::PortArguments;
 use super::print;
 
 /// Arguments of `bowden faults`.

@@ -10,10 +10,10 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
 use bowden_core::rig::Rig;
-use bowden_host_link::PortArguments;
-use bowden_host_link::investigate::limits::Wishes;
 use bowden_host_link::investigate::{Dialog, Setup, investigate};
 
+use super::limits::LimitArguments;
+use super::port::PortArguments;
 use super::print;
 use crate::interrupt;
 use crate::progress::UntilInterrupted;
@@ -39,7 +39,7 @@ pub struct InvestigateArguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
-    wishes: Wishes,
+    limits: LimitArguments,
     /// Format of the recordings
     #[arg(long, value_name = "FORMAT", default_value = "csv", value_parser = ["csv", "csv.gz", "mcap"])]
     format: String,
@@ -125,7 +125,7 @@ impl InvestigateArguments {
         let setup = Setup {
             rig: &self.rig,
             folder: &self.out,
-            wishes: self.wishes,
+            wishes: self.limits.into(),
             ending: &self.format,
             every: self.every,
             dry_run: self.dry_run,

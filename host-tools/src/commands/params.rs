@@ -9,9 +9,10 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::rig::Rig;
 use bowden_host_link::from_rig::Transfer;
-use bowden_host_link::{Client, ParameterSet, PortArguments};
+use bowden_host_link::{Client, ParameterSet};
 use table::TableArguments;
 
+use super::port::PortArguments;
 use super::print;
 
 /// Arguments of `bowden params`.

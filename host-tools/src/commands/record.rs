@@ -7,12 +7,14 @@ use bowden_core::output;
 use bowden_core::progress::Progress;
 use bowden_core::recording::Format;
 use bowden_host_link::capture::{Capture, PROGRESS_STEPS, save_parameters, sidecar};
-use bowden_host_link::course::{Course, CourseArguments, run_seconds};
+use bowden_host_link::course::Course;
 use bowden_host_link::recorder::Tally;
 use bowden_host_link::rig_file::{self, Weight};
 use bowden_host_link::session::{RunEnd, Session};
-use bowden_host_link::{LinkError, ParameterSet, PortArguments};
+use bowden_host_link::{LinkError, ParameterSet};
 
+use super::course::{CourseArguments, run_seconds};
+use super::port::PortArguments;
 use crate::interrupt;
 
 /// Arguments of `bowden record`.

@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 
 use bowden_core::outcome::{Failure, Outcome};
-use bowden_host_link::course::{CourseArguments, run_seconds};
+use bowden_host_link::LinkError;
 use bowden_host_link::recorder::tick_time_s;
 use bowden_host_link::session::{RunEnd, RunTick, Session};
-use bowden_host_link::{LinkError, PortArguments};
 use bowden_link::Limit;
 
+use super::course::{CourseArguments, run_seconds};
+use super::port::PortArguments;
 use super::print;
 use crate::interrupt;
 

@@ -22,7 +22,7 @@ pub struct SimulateArguments {
     out: PathBuf,
     /// Built-in motion of the reference
     #[arg(long, value_name = "NAME", default_value = "lab", conflicts_with = "reference")]
-    motion: Motion,
+    motion: MotionName,
     /// Recording whose `theta_ref_rad` is the reference
     #[arg(long, value_name = "FILE.csv")]
     reference: Option<PathBuf>,
@@ -35,6 +35,36 @@ pub struct SimulateArguments {
     /// Seed of the built-in motion and of the sensors' noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
+}
+
+/// A built-in motion, as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum MotionName {
+    /// Rest, slow sine, multisine, ramps and staircase, one after the other
+    Lab,
+    /// Slow sine
+    Sine,
+    /// Ramps of constant, random speed between random turning points
+    Triangle,
+    /// Tones between 0.15 and 1.3 Hz with random phases
+    Multisine,
+    /// Random levels, each reached smoothly and held
+    Staircase,
+    /// No motion
+    Rest,
+}
+
+impl From<MotionName> for Motion {
+    fn from(name: MotionName) -> Self {
+        match name {
+            MotionName::Lab => Self::Lab,
+            MotionName::Sine => Self::Sine,
+            MotionName::Triangle => Self::Triangle,
+            MotionName::Multisine => Self::Multisine,
+            MotionName::Staircase => Self::Staircase,
+            MotionName::Rest => Self::Rest,
+        }
+    }
 }
 
 /// Length of a run when nothing says it, s.
@@ -107,7 +137,7 @@ impl SimulateArguments {
                 Reference::of_recording(&recording)?;
                 Course::Reference(recording)
             }
-            None => Course::Motion(self.motion),
+            None => Course::Motion(self.motion.into()),
         };
         let seconds = match (&course, self.seconds) {
             (_, Some(seconds)) => seconds,

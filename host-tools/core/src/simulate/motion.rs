@@ -30,7 +30,7 @@ const HOLD_S: [f64; 2] = [0.7, 1.4];
 const FADE_S: f64 = 0.7;
 
 /// A built-in motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Rest, slow sine, multisine, ramps and staircase, one after the other
     Lab,

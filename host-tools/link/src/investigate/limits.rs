@@ -14,20 +14,16 @@ const SPEED_SHARE: f32 = 0.5;
 pub const DEFAULT_TIME_S: f64 = 120.0;
 
 /// Limits that the user sets; where there is none, the board's count.
-#[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wishes {
-    /// Largest angle of the joint, rad [default: 0.6 of what the board allows]
-    #[arg(long, value_name = "RAD", value_parser = positive)]
-    pub(super) angle: Option<f64>,
-    /// Largest torque at the joint that a reference may ask for, N·m [default: what the board allows]
-    #[arg(long, value_name = "NM", value_parser = positive)]
-    pub(super) torque: Option<f64>,
-    /// Largest speed of the joint that a reference may ask for, rad/s [default: 0.5 of what the board allows]
-    #[arg(long, value_name = "RAD/S", value_parser = positive)]
-    pub(super) speed: Option<f64>,
-    /// Longest time that the joint is driven along references, all runs together, s; the runs are shortened to it
-    #[arg(long, value_name = "S", default_value_t = DEFAULT_TIME_S, value_parser = positive)]
-    pub(super) time: f64,
+    /// Largest angle of the joint, rad; 0.6 of what the board allows if none.
+    pub angle: Option<f64>,
+    /// Largest torque at the joint that a reference may ask for, N·m; what the board allows if none.
+    pub torque: Option<f64>,
+    /// Largest speed of the joint that a reference may ask for, rad/s; 0.5 of what the board allows if none.
+    pub speed: Option<f64>,
+    /// Longest time that the joint is driven along references, all runs together, s; the runs are shortened to it.
+    pub time: f64,
 }
 
 impl Default for Wishes {
@@ -42,13 +38,6 @@ impl Wishes {
     /// The shortest investigation there is.
     pub(super) fn shortest() -> Self {
         Self { time: 42.0, ..Self::default() }
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value <= 1e6 => Ok(value),
-        _ => Err("expected a number above 0".to_owned()),
     }
 }
 

@@ -1,0 +1,34 @@
+//! Arguments that say which board.
+
+use std::time::Duration;
+
+use bowden_host_link::{Client, LinkError};
+
+/// Arguments that say which board.
+#[derive(Clone, Debug, clap::Args)]
+pub struct PortArguments {
+    /// Serial port of the board, `auto` for the one on USB, or `sim` for a simulated board with a simulated joint,
+    /// switched on anew each time; `sim:joint_backlash:0.8,seed=7` for one that conceals something
+    #[arg(long, value_name = "PATH|auto|sim")]
+    port: String,
+    /// How long an answer of the board is waited for, s
+    #[arg(long, value_name = "SECONDS", default_value = "1.5", value_parser = timeout)]
+    timeout: Duration,
+}
+
+impl PortArguments {
+    /// Opens the port and greets the board.
+    ///
+    /// # Errors
+    /// See [`bowden_host_link::connect`].
+    pub fn connect(&self) -> Result<Client, LinkError> {
+        bowden_host_link::connect(&self.port, self.timeout)
+    }
+}
+
+fn timeout(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.05..=600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("allowed 0.05 to 600 s".to_owned()),
+    }
+}
