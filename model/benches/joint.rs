@@ -12,7 +12,8 @@ use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
     SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 use divan::counter::ItemsCount;
 
 /// Length of the session, s, and simulation step, s.

@@ -7,7 +7,6 @@ use crate::effect::Component;
 use crate::effect::{SlipLaw, TendonPort, TransmissionPort};
 use crate::effect_set::{EffectSet, EffectStates};
 use crate::parameters::{FrictionLaw, PulleyParameters, SheathParameters, TendonParameters};
-use crate::plant::Outside;
 use crate::sheath::{End, SheathError, SlipLimits, Tendon, TendonMesh};
 
 /// Contacts of each tendon unless a rig says otherwise.
@@ -18,6 +17,11 @@ const CABLE_SIGN: [f64; 2] = [1.0, -1.0];
 
 /// Newton steps by which a pulley inside a play finds the place without torque, in one simulation step.
 const PLAY_STEPS: usize = 4;
+
+/// Internal friction of the ropes: the torque of a stretch rate, as a time. A wire rope loses some 5 % of its elastic
+/// energy per cycle near 20 Hz, which gives half a millisecond; without it the arm would ring for seconds after each
+/// start. At steady speed it does nothing.
+const ROPE_LOSS_S: f64 = 5e-4;
 
 /// Pulleys, tendons and sheaths: configuration only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +84,21 @@ impl TransmissionConfig {
         };
         // Half an element of each tendon.
         4.0 * self.mesh.elements() as f64 / self.mesh.total_compliance_m_per_n() * radius_m * radius_m
+    }
+
+    /// Turns of the output pulley per turn of the input pulley.
+    #[inline]
+    pub(crate) fn pulley_ratio(&self) -> f64 {
+        self.pulleys.input_radius_m / self.pulleys.output_radius_m
+    }
+
+    /// Torque on the joint from the internal friction of both ropes, N·m.
+    #[inline]
+    pub(crate) fn rope_loss_nm(&self, omega_in_rad_s: f64, omega_out_rad_s: f64) -> f64 {
+        let radius_m = self.pulleys.output_radius_m;
+        let stiffness_nm_per_rad = 2.0 * radius_m * radius_m / self.mesh.total_compliance_m_per_n();
+        let lag_rad_s = self.pulley_ratio() * omega_in_rad_s - omega_out_rad_s;
+        ROPE_LOSS_S * stiffness_nm_per_rad * lag_rad_s
     }
 
     fn nominal_tendon_port(&self) -> TendonPort {
@@ -295,6 +314,20 @@ impl Transmission {
             }
         }
     }
+}
+
+/// A torque from outside on a pulley without inertia, which must be told together with how it follows the angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outside {
+    /// Torque at the angle where the pulley is, N·m; positive turns it forward.
+    pub torque_nm: f64,
+    /// By how much it falls as the pulley turns forward, N·m/rad, at least 0.
+    pub stiffness_nm_per_rad: f64,
+}
+
+impl Outside {
+    /// Nothing acts.
+    pub const NOTHING: Self = Self { torque_nm: 0.0, stiffness_nm_per_rad: 0.0 };
 }
 
 /// Angles and speeds of both pulleys at the start of a step.

@@ -11,7 +11,8 @@ use bowden_model::effects::find;
 use bowden_model::parameters::{
     FrictionLaw, JointParameters, PulleyParameters, SensorParameters, SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 
 /// Speed, angle of the joint and angle by which the input pulley leads.
 #[derive(Clone, Copy, Debug)]

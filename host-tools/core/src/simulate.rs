@@ -7,7 +7,8 @@ mod sensing;
 use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect_set::EffectSet;
-use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 
 use crate::outcome::Failure;
 use crate::recording::Recording;

@@ -15,7 +15,8 @@ use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::{ActiveEffect, SensorPort};
 use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
-use bowden_model::plant::{Outside, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;

@@ -8,7 +8,8 @@ use bowden_model::effects::find;
 use bowden_model::parameters::{
     FrictionLaw, JointParameters, PulleyParameters, SensorParameters, SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 
 const R1_M: f64 = 0.009;
 const R2_M: f64 = 0.010;

@@ -3,13 +3,13 @@
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
+use bowden_model::load::GRAVITY_M_S2;
 use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, PulleyParameters, SensorParameters, SheathParameters,
     TendonParameters,
 };
-use bowden_model::plant::{
-    GRAVITY_M_S2, InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput,
-};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 
 pub const RADIUS_M: f64 = 0.015;
 pub const MASS_KG: f64 = 1.5;

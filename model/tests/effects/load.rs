@@ -4,7 +4,8 @@ use crate::joint::{IDLE, INERTIA_KG_M2, RADIUS_M, Run, STIFFNESS_N_PER_M, WEIGHT
 use crate::near::near;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
-use bowden_model::plant::{GRAVITY_M_S2, InputBoundary, OutputBoundary, StepInput};
+use bowden_model::load::GRAVITY_M_S2;
+use bowden_model::plant::{InputBoundary, OutputBoundary, StepInput};
 
 /// Both cables, N·m per radian of the joint.
 const CABLES_NM_PER_RAD: f64 = 2.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M;

@@ -7,7 +7,8 @@ use bowden_model::drive::{BridgeInput, after_elastic_friction_rad_s};
 use bowden_model::effect::{ActiveEffect, PRESLIDING_RAD};
 use bowden_model::effects::find;
 use bowden_model::parameters::{JointParameters, MotorParameters};
-use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, StepInput};
+use bowden_model::transmission::Outside;
 
 fn effect(id: &str) -> ActiveEffect {
     ActiveEffect::with_defaults(find(id).unwrap())

@@ -11,7 +11,7 @@ use bowden_core::outcome::Failure;
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
-use bowden_model::plant::GRAVITY_M_S2;
+use bowden_model::load::GRAVITY_M_S2;
 use rayon::prelude::*;
 
 use super::diagnosed::Case;

@@ -16,7 +16,8 @@ use bowden_model::parameters::{
     FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
     SheathParameters, TendonParameters,
 };
-use bowden_model::plant::{InputBoundary, OutputBoundary, Outside, Plant, PlantConfig, StepInput};
+use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
+use bowden_model::transmission::Outside;
 
 /// The bench of the paper, as the parameters have it by default.
 pub fn joint() -> JointParameters {

@@ -5,7 +5,7 @@
 
 use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::{ActiveEffect, Component, Effect, ParameterSpec};
-use bowden_model::plant::GRAVITY_M_S2;
+use bowden_model::load::GRAVITY_M_S2;
 
 use crate::joint_model::JointModel;
 
