@@ -8,9 +8,10 @@ use std::f64::consts::{PI, TAU};
 
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect_set::EffectSet;
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::parameters::{
-    FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
-    SheathParameters, TendonParameters,
+    JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters, SheathParameters,
+    TendonParameters,
 };
 use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
 use bowden_model::transmission::Outside;

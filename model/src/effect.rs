@@ -5,7 +5,7 @@
 //! what it needs to. A hook that an effect leaves out does nothing; an effect that is not active costs nothing.
 
 use crate::channel::Channel;
-use crate::parameters::FrictionLaw;
+use crate::friction_law::FrictionLaw;
 
 /// Largest number of parameters that one effect may have.
 pub const MAX_PARAMETERS: usize = 6;

@@ -6,7 +6,7 @@ use crate::effect::{
     ActiveEffect, Component, DrivePort, EffectState, JointPort, MAX_PARAMETERS, MAX_STATE, MotorPort,
     SensorPort, TransmissionPort,
 };
-use crate::parameters::FrictionLaw;
+use crate::friction_law::FrictionLaw;
 
 /// Largest number of effects in one simulation.
 pub const MAX_ACTIVE: usize = 12;

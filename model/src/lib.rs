@@ -7,6 +7,7 @@ pub mod drive;
 pub mod effect;
 pub mod effect_set;
 pub mod effects;
+pub mod friction_law;
 pub mod load;
 pub mod paper;
 pub mod parameters;

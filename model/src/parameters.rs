@@ -1,6 +1,7 @@
 //! Nominal parameters of a joint, as a rig file states them.
 
 use crate::effect::{ParameterSpec, Scale};
+use crate::friction_law::FrictionLaw;
 
 /// Rotor-side electrical and inertia values of a geared DC motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,15 +95,6 @@ impl Default for SensorParameters {
             current_noise_a: 0.0,
         }
     }
-}
-
-/// How friction acts along the sheath.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrictionLaw {
-    /// Along the whole sheath; a part of the tendon may stick while the rest slips.
-    Distributed,
-    /// All of it at one contact in the middle: the lumped loop of Eq. (17)–(24).
-    Lumped,
 }
 
 /// All nominal parameters of one joint. A missing section is a missing part.

@@ -6,7 +6,8 @@
 use crate::effect::Component;
 use crate::effect::{SlipLaw, TendonPort, TransmissionPort};
 use crate::effect_set::{EffectSet, EffectStates};
-use crate::parameters::{FrictionLaw, PulleyParameters, SheathParameters, TendonParameters};
+use crate::friction_law::FrictionLaw;
+use crate::parameters::{PulleyParameters, SheathParameters, TendonParameters};
 use crate::sheath::{End, SheathError, SlipLimits, Tendon, TendonMesh};
 
 /// Contacts of each tendon unless a rig says otherwise.

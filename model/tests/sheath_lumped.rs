@@ -3,10 +3,11 @@
 #[path = "common/near.rs"]
 mod near;
 
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::paper::displacement_transmission::{dead_zone_input_rad, lag_angle_rad};
 use bowden_model::paper::torque_transmission::friction_torque_nm;
 use bowden_model::paper::{Direction, LoopTorque, TendonPair};
-use bowden_model::parameters::{FrictionLaw, PulleyParameters, SheathParameters, TendonParameters};
+use bowden_model::parameters::{PulleyParameters, SheathParameters, TendonParameters};
 use bowden_model::sheath::End;
 use bowden_model::transmission::{Transmission, TransmissionConfig};
 use near::near;

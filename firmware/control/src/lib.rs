@@ -27,6 +27,7 @@ pub mod compensator;
 pub mod conformance;
 pub mod controller;
 pub mod correction;
+pub mod detection;
 pub mod drive;
 pub mod encoder;
 pub mod impedance;

@@ -26,6 +26,7 @@ pub mod rest;
 use bowden_link::message::{Goal, Mode};
 use bowden_link::{Fault, FaultRecord, State};
 
+use crate::detection::Detection;
 use crate::scale::{Angle, Current, Tension};
 use crate::sheath::Fitted;
 use crate::tension::TensionChecks;
@@ -45,27 +46,6 @@ pub const fn allows(state: State, goal: Goal) -> bool {
         Goal::Ready => matches!(state, State::Off | State::Ready),
         Goal::Home | Goal::Run(_) => matches!(state, State::Ready),
         Goal::ClearFault => matches!(state, State::Fault),
-    }
-}
-
-/// A fault that was found, before it is recorded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Detection {
-    /// What.
-    pub fault: Fault,
-    /// Which one.
-    pub channel: u8,
-    /// What was measured.
-    pub got: f32,
-    /// What is allowed.
-    pub limit: f32,
-}
-
-impl Detection {
-    /// A detection; `channel` counts from 0.
-    #[must_use]
-    pub const fn new(fault: Fault, channel: usize, got: f32, limit: f32) -> Self {
-        Self { fault, channel: channel as u8, got, limit }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use bowden_link::Fault;
 
+use crate::detection::Detection;
 use crate::scale::{Code, Current, Debounce, Gain, Quantity, Sum, Voltage, Weight};
-use crate::supervisor::Detection;
 use crate::tension::code;
 
 /// Channels and what is expected of them.

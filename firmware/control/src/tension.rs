@@ -2,9 +2,9 @@
 
 use bowden_link::Fault;
 
+use crate::detection::Detection;
 use crate::scale::{Angle, Code, Debounce, Gain, Quantity, Sum, Tension, Weight};
 use crate::sheath::Fitted;
-use crate::supervisor::Detection;
 
 /// Volts a code of the 12-bit converters at 3.3 V reference.
 pub const V_PER_CODE: f32 = 3.3 / 4095.0;

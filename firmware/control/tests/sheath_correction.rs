@@ -8,8 +8,9 @@ use bowden_model::drive::BridgeInput;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
 use bowden_model::effects::find;
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::parameters::{
-    FrictionLaw, JointParameters, PulleyParameters, SensorParameters, SheathParameters, TendonParameters,
+    JointParameters, PulleyParameters, SensorParameters, SheathParameters, TendonParameters,
 };
 use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
 use bowden_model::transmission::Outside;

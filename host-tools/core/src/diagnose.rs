@@ -15,6 +15,7 @@ mod layout;
 mod locked;
 mod onset;
 mod place;
+mod regimes;
 mod residual_map;
 mod screening;
 mod selection;
@@ -386,7 +387,7 @@ impl Case<'_> {
             written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
         };
         Diagnosed {
-            findings: Findings { diagnosis, traces, regimes: place::regimes(objective, stages) },
+            findings: Findings { diagnosis, traces, regimes: regimes::regimes(objective, stages) },
             experiments,
             now: self.benches.iter().map(|(_, bench)| self.now(bench, &last.model, clock_s)).collect(),
         }

@@ -5,7 +5,8 @@ use bowden_core::rig::{ProportionalLaw, Rig, RigDocument};
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Target};
 use bowden_model::effects::{CATALOGUE, find};
-use bowden_model::parameters::{FrictionLaw, NOMINAL_PARAMETERS};
+use bowden_model::friction_law::FrictionLaw;
+use bowden_model::parameters::NOMINAL_PARAMETERS;
 
 const RIG: &str = r#"# Bench 3, second floor
 schema = "bowden-rig/1"

@@ -2,7 +2,7 @@
 //! lumps it.
 
 use crate::effect::{Component, Descriptor, Effect};
-use crate::parameters::FrictionLaw;
+use crate::friction_law::FrictionLaw;
 
 /// Friction acts along the whole sheath, so that a part of the tendon may stick while the rest slips; without effect where
 /// the rig says so already.

@@ -3,10 +3,10 @@
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::load::GRAVITY_M_S2;
 use bowden_model::parameters::{
-    FrictionLaw, JointParameters, LoadParameters, PulleyParameters, SensorParameters, SheathParameters,
-    TendonParameters,
+    JointParameters, LoadParameters, PulleyParameters, SensorParameters, SheathParameters, TendonParameters,
 };
 use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
 use bowden_model::transmission::Outside;

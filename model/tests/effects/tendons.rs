@@ -4,7 +4,8 @@ use crate::joint::{IDLE, PRETENSION_N, RADIUS_M, Run, STIFFNESS_N_PER_M, joint};
 use crate::near::near;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
-use bowden_model::parameters::{FrictionLaw, JointParameters};
+use bowden_model::friction_law::FrictionLaw;
+use bowden_model::parameters::JointParameters;
 use bowden_model::plant::{InputBoundary, OutputBoundary, StepInput};
 
 const K_RAD: f64 = std::f64::consts::PI;

@@ -2,7 +2,8 @@
 
 use bowden_link::Fault;
 
-use super::{Detection, Situation, SupervisorConfig};
+use super::{Situation, SupervisorConfig};
+use crate::detection::Detection;
 use crate::scale::{Quantity, Tension};
 
 /// Counts by which an encoder may move in a look: noise of its last bit.

@@ -12,9 +12,10 @@ use bowden_model::channel::Channel;
 use bowden_model::drive::BridgeInput;
 use bowden_model::effect::{ActiveEffect, SensorPort};
 use bowden_model::effect_set::{EffectSet, FRESH_STATES};
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::parameters::{
-    FrictionLaw, JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters,
-    SheathParameters, TendonParameters,
+    JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters, SheathParameters,
+    TendonParameters,
 };
 use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, StepInput};
 use bowden_model::transmission::Outside;

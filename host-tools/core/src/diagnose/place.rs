@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use bowden_model::channel::Channel;
 use bowden_model::effect::Component;
 
-use super::stages::Stages;
-use super::verdict::{Mismatch, RegimeResidual};
+use super::verdict::Mismatch;
 use crate::fit::objective::{Block, Entry, Objective, Residuals, Series, loss};
 use crate::reconstruct::Motion;
 
@@ -33,7 +32,7 @@ pub(crate) enum Regime {
 }
 
 impl Regime {
-    const fn name(self) -> &'static str {
+    pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Reversal => "reversal",
             Self::Hold => "hold",
@@ -157,35 +156,4 @@ pub(crate) fn mismatch(objective: &Objective, residuals: &Residuals) -> Vec<Mism
         .collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     found
-}
-
-/// Root mean square differences by channel and regime, over all recordings.
-pub(crate) fn regimes(objective: &Objective, stages: &Stages) -> Vec<RegimeResidual> {
-    let regimes: Vec<Vec<Regime>> = (0..objective.recordings()).map(|r| regimes_of(objective, r)).collect();
-    let by_stage = [&stages.before, &stages.recalibrated, &stages.after].map(|stage| {
-        let mut sums: BTreeMap<(Series, Regime), (f64, f64)> = BTreeMap::new();
-        for (entry, value) in objective.entries().zip(&stage.residuals.values) {
-            let regime = regimes[entry.recording][usize::midpoint(entry.block.start, entry.block.end)];
-            let sum = sums.entry((entry.series, regime)).or_insert((0.0, 0.0));
-            sum.0 += (value * objective.scale(entry.series)).powi(2);
-            sum.1 += 1.0;
-        }
-        sums
-    });
-    let [before, recalibrated, after] = by_stage;
-    before
-        .iter()
-        .map(|(key, sum)| {
-            let rms = |sum: Option<&(f64, f64)>| sum.map_or(0.0, |(sum, count)| (sum / count).sqrt());
-            let (series, regime) = *key;
-            RegimeResidual {
-                channel: series.name().to_owned(),
-                unit: unit_of(series).to_owned(),
-                regime: regime.name().to_owned(),
-                before_rmse: rms(Some(sum)),
-                recalibrated_rmse: rms(recalibrated.get(key)),
-                after_rmse: rms(after.get(key)),
-            }
-        })
-        .collect()
 }

@@ -1,9 +1,10 @@
 //! From the text of a rig file to a [`Rig`].
 
 use bowden_model::channel::Channel;
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::parameters::{
-    FrictionLaw, JointParameters, LoadParameters, MotorParameters, NOMINAL_PARAMETERS, PulleyParameters,
-    SensorParameters, SheathParameters, TendonParameters, nominal,
+    JointParameters, LoadParameters, MotorParameters, NOMINAL_PARAMETERS, PulleyParameters, SensorParameters,
+    SheathParameters, TendonParameters, nominal,
 };
 use toml::de::{DeTable, DeValue};
 
