@@ -10,6 +10,7 @@ mod columns;
 mod comma_separated;
 mod mcap_file;
 mod place;
+mod row;
 mod row_writer;
 mod spikes;
 mod text_column;
@@ -28,7 +29,8 @@ use crate::output;
 pub use columns::{ColumnMap, ColumnSource, TIME_ROLE};
 pub use mcap_file::TOPIC;
 pub use place::Places;
-pub use row_writer::{Cell, RowColumn, RowWriter};
+pub use row::{Cell, RowColumn};
+pub use row_writer::RowWriter;
 pub use text_column::TextColumn;
 
 /// Buffer between file and parser, bytes.

@@ -16,6 +16,7 @@ pub mod changes;
 mod correction;
 pub mod demand;
 pub mod driver;
+mod files;
 pub mod limits;
 mod page;
 pub mod plan;
@@ -131,13 +132,13 @@ pub fn investigate(
         if account.recordings.is_empty() {
             return Err(failure);
         }
-        let kept = match account.save(setup.folder) {
+        let kept = match files::save(&account, setup.folder) {
             Ok(_) => format!("what was recorded is kept in {}", setup.folder.display()),
             Err(other) => other.message().to_owned(),
         };
         return Err(failure.with_note(&kept));
     }
-    let page = account.save(setup.folder)?;
+    let page = files::save(&account, setup.folder)?;
     off?;
     dialog.show(&format!("{}\n{}\n", account.conclusion(), page.display()))?;
     let mut outcome = Outcome::done();

@@ -4,7 +4,7 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 
 use super::build::Table;
 use super::place::Places;
-use super::row_writer::Cell;
+use super::row::Cell;
 use super::{Origin, READ_BUFFER, ReadOptions, Recording, TIME_ROLE, Tail};
 use crate::outcome::Failure;
 

@@ -17,7 +17,7 @@ use serde_json::value::RawValue;
 
 use super::build::Table;
 use super::place::Places;
-use super::row_writer::{Cell, RowColumn};
+use super::row::{Cell, RowColumn};
 use super::{Origin, ReadOptions, Recording, TIME_ROLE};
 use crate::outcome::Failure;
 

@@ -1,11 +1,7 @@
 //! What an investigation says: the content of `investigation.json`, schema `bowden-investigation/1`, and of its page.
 
 use std::fmt::Write as _;
-use std::io::Write;
-use std::path::{Path, PathBuf};
 
-use bowden_core::outcome::Failure;
-use bowden_core::output;
 use serde::Serialize;
 
 use super::changes::{Changes, Reason, State};
@@ -126,19 +122,5 @@ impl Investigation {
     pub fn followed_worse(&self) -> bool {
         let effect = self.verification.as_ref().and_then(|verification| verification.effect);
         effect == Some(Effect::Worse)
-    }
-
-    /// Writes numbers and page; returns where the page is.
-    ///
-    /// # Errors
-    /// When the medium refuses.
-    pub fn save(&self, folder: &Path) -> Result<PathBuf, Failure> {
-        let result = folder.join(RESULT);
-        let json = serde_json::to_string_pretty(self)
-            .map_err(|error| Failure::failed(format!("{}: {error}", result.display())))?;
-        output::write_file(&result, |file| writeln!(file, "{json}"))?;
-        let page = folder.join(PAGE);
-        output::write_file(&page, |file| file.write_all(super::page::page(self).into_string().as_bytes()))?;
-        Ok(page)
     }
 }

@@ -1,0 +1,75 @@
+//! What a replay predicts, kept or handed on sample by sample.
+
+use bowden_model::channel::Channel;
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effect_set::EffectSet;
+
+use super::input::ReplayInput;
+use super::sensors::through;
+use crate::outcome::Failure;
+
+/// Predicted channels, one value a sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prediction {
+    pub(super) channels: Vec<(Channel, Vec<f64>)>,
+    /// Torque that guided the motor, N·m at the input pulley; what its model does not explain. Empty where none was
+    /// needed.
+    pub guide_nm: Vec<f64>,
+}
+
+impl Prediction {
+    /// One channel.
+    #[must_use]
+    pub fn channel(&self, channel: Channel) -> Option<&[f64]> {
+        self.channels.iter().find(|(c, _)| *c == channel).map(|(_, values)| values.as_slice())
+    }
+
+    /// One channel of the same joint seen with one more effect on its sensor, in the last place; empty for what was not
+    /// predicted.
+    ///
+    /// # Errors
+    /// When the set of one effect cannot be made.
+    pub fn seen_through(
+        &self,
+        channel: Channel,
+        effect: ActiveEffect,
+        input: &ReplayInput,
+    ) -> Result<Vec<f64>, Failure> {
+        let effects = EffectSet::from_slice(&[effect]).map_err(Failure::bad_input)?;
+        let values = self.channel(channel).unwrap_or_default();
+        Ok(through(input.t_s(), values, |states, port| effects.measure(channel, states, port)))
+    }
+
+    /// Values of a channel, which is left empty; empty for what was not predicted.
+    pub fn take(&mut self, channel: Channel) -> Vec<f64> {
+        let found = self.channels.iter_mut().find(|(c, _)| *c == channel);
+        found.map(|(_, values)| std::mem::take(values)).unwrap_or_default()
+    }
+
+    /// All channels, to be changed.
+    pub fn channels_mut(&mut self) -> impl Iterator<Item = (Channel, &mut [f64])> {
+        self.channels.iter_mut().map(|(channel, values)| (*channel, values.as_mut_slice()))
+    }
+
+    /// All channels.
+    pub fn channels(&self) -> impl Iterator<Item = (Channel, &[f64])> {
+        self.channels.iter().map(|(channel, values)| (*channel, values.as_slice()))
+    }
+}
+
+/// What takes the samples of a replay, so that nobody has to keep them who only compares.
+pub trait Sink {
+    /// The next sample: every output in the order in which they were asked for, and the torque that guided the motor, N·m at the input
+    /// pulley, where one did.
+    fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>);
+}
+
+/// Keeps everything.
+impl Sink for Prediction {
+    fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>) {
+        for ((_, values), value) in self.channels.iter_mut().zip(outputs) {
+            values.push(*value);
+        }
+        self.guide_nm.extend(guide_nm);
+    }
+}

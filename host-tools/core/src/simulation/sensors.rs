@@ -1,0 +1,57 @@
+//! Sensors of a replay: channels as they would show without noise and steps.
+
+use bowden_model::channel::Channel;
+use bowden_model::effect::SensorPort;
+use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
+use bowden_model::plant::{Plant, PlantConfig};
+
+/// What the sensors would have shown had they no noise and no steps.
+pub(super) struct Sampler<'a> {
+    effects: &'a EffectSet,
+    outputs: &'a [Channel],
+    states: Vec<EffectStates>,
+    values: Vec<f64>,
+}
+
+impl<'a> Sampler<'a> {
+    pub fn new(outputs: &'a [Channel], effects: &'a EffectSet) -> Self {
+        let states = vec![FRESH_STATES; outputs.len()];
+        Self { effects, outputs, states, values: vec![0.0; outputs.len()] }
+    }
+
+    pub fn sample(
+        &mut self,
+        config: &PlantConfig,
+        plant: &Plant,
+        duty: f64,
+        (t_s, dt_s): (f64, f64),
+    ) -> &[f64] {
+        for ((channel, value), states) in self.outputs.iter().zip(&mut self.values).zip(&mut self.states) {
+            let outside = if *channel == Channel::Duty { duty } else { 0.0 };
+            let mut port =
+                SensorPort { t_s, dt_s, value: plant.channel(config, *channel).unwrap_or(outside) };
+            self.effects.measure(*channel, states, &mut port);
+            *value = port.value;
+        }
+        &self.values
+    }
+}
+
+/// Values of one sensor, sample by sample.
+pub fn through(
+    t_s: &[f64],
+    values: &[f64],
+    mut sensor: impl FnMut(&mut EffectStates, &mut SensorPort),
+) -> Vec<f64> {
+    let mut states = FRESH_STATES;
+    let mut before_s = t_s.first().copied().unwrap_or(0.0);
+    t_s.iter()
+        .zip(values)
+        .map(|(&t_s, &value)| {
+            let mut port = SensorPort { t_s, dt_s: t_s - before_s, value };
+            before_s = t_s;
+            sensor(&mut states, &mut port);
+            port.value
+        })
+        .collect()
+}
