@@ -6,27 +6,28 @@
 //! same `f64`, so that converting between the formats and back changes no bit of them.
 
 mod build;
+mod column;
 mod columns;
 mod comma_separated;
+mod file;
+mod format;
 mod mcap_file;
+mod origin;
 mod place;
 mod row;
 mod row_writer;
 mod spikes;
+mod tail;
 mod text_column;
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
-use std::path::Path;
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
 
-use crate::outcome::Failure;
-use crate::output;
-
+pub use column::Column;
 pub use columns::{ColumnMap, ColumnSource, TIME_ROLE};
+pub use format::Format;
 pub use mcap_file::TOPIC;
 pub use place::Places;
 pub use row::{Cell, RowColumn};
@@ -35,44 +36,6 @@ pub use text_column::TextColumn;
 
 /// Buffer between file and parser, bytes.
 const READ_BUFFER: usize = 1 << 18;
-
-/// One column beside the time.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Column {
-    /// A role, in the unit of its channel.
-    Known {
-        /// The role.
-        channel: Channel,
-        /// One value a sample; what is prepared for a replay shares them.
-        values: Arc<Vec<f64>>,
-    },
-    /// A column that is not interpreted.
-    Unknown(TextColumn),
-}
-
-impl Column {
-    /// Name as it stands in a header.
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Known { channel, .. } => channel.role(),
-            Self::Unknown(text) => text.name(),
-        }
-    }
-
-    fn written(&self) -> RowColumn {
-        match self {
-            Self::Known { channel, .. } => RowColumn::Known(*channel),
-            Self::Unknown(text) => RowColumn::Unknown(text.name().to_owned()),
-        }
-    }
-
-    fn cell(&self, sample: usize) -> Cell<'_> {
-        match self {
-            Self::Known { values, .. } => Cell::Number(values[sample]),
-            Self::Unknown(text) => Cell::Text(text.cell(sample).unwrap_or_default()),
-        }
-    }
-}
 
 /// What to read from a file; by default everything, under the names of the roles.
 #[derive(Clone, Debug, Default)]
@@ -295,162 +258,6 @@ impl Recording {
             places: self.places.after(samples.start),
             notes: self.notes.clone(),
             passed_over: self.passed_over.clone(),
-        }
-    }
-
-    /// Reads a file. The content decides between CSV, gzipped CSV and MCAP, whatever the file is called.
-    ///
-    /// A file that ends early (a last line without its end that makes no whole row, gzip data or an MCAP file
-    /// without its end) gives the samples that are whole and a note.
-    ///
-    /// # Errors
-    /// One line that names the file, the line or byte, the column, what was there, and what to do: no or double
-    /// `t_s` column, rows of another length than the header, cells of a channel that are no finite number, time that
-    /// does not increase, text that is not UTF-8, damaged compression, no samples.
-    pub fn load(path: &Path, options: &ReadOptions) -> Result<Self, Failure> {
-        let source = path.display().to_string();
-        let unreadable = |error: &std::io::Error| {
-            let reason = output::describe(error);
-            Failure::bad_input(format!("{source}: cannot be read: {reason}; check the path"))
-        };
-        if path.is_dir() {
-            return Err(Failure::bad_input(format!(
-                "{source}: is a folder, expected a recording; name a file"
-            )));
-        }
-        let file = File::open(path).map_err(|error| unreadable(&error))?;
-        let mut file = BufReader::with_capacity(READ_BUFFER, file);
-        let start = file.fill_buf().map_err(|error| unreadable(&error))?;
-        let named_mcap = Format::of(path).is_some_and(|format| format == Format::Mcap);
-        if start.is_empty() {
-            return Err(Failure::bad_input(format!(
-                "{source}:1: the file is empty, expected a header line with t_s; record again"
-            )));
-        }
-        if start.starts_with(mcap::MAGIC) {
-            mcap_file::read(file, source, options)
-        } else if named_mcap {
-            Err(Failure::bad_input(format!(
-                "{source}: byte 0: not the start of an MCAP file; if it is a table, call it .csv"
-            )))
-        } else if start.starts_with(&GZIP_MAGIC) {
-            comma_separated::read(flate2::bufread::MultiGzDecoder::new(file), source, options)
-        } else {
-            comma_separated::read(file, source, options)
-        }
-    }
-
-    /// Writes the recording in the format that the file name asks for: `.csv`, `.csv.gz` or `.mcap`.
-    ///
-    /// # Errors
-    /// A name that asks for no known format (see [`Format::for_output`]), or the reason why the medium refuses.
-    pub fn save(&self, path: &Path) -> Result<(), Failure> {
-        let format = Format::for_output(path)?;
-        let columns: Vec<RowColumn> = self.columns.iter().map(Column::written).collect();
-        output::write_file(path, |file| {
-            let mut writer = RowWriter::new(format, &columns, None, file)?;
-            for (sample, t_s) in self.t_s.iter().enumerate() {
-                writer.row(*t_s, self.columns.iter().map(|column| column.cell(sample)))?;
-            }
-            writer.finish()
-        })
-    }
-}
-
-/// First bytes of gzip data.
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
-
-/// Format of a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Comma-separated, one header line.
-    Csv,
-    /// The same, gzipped.
-    GzippedCsv,
-    /// MCAP with JSON messages.
-    Mcap,
-}
-
-impl Format {
-    /// The format that a file name asks for, if any.
-    pub fn of(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
-        [(".csv", Self::Csv), (".csv.gz", Self::GzippedCsv), (".mcap", Self::Mcap)]
-            .into_iter()
-            .find_map(|(ending, format)| name.ends_with(ending).then_some(format))
-    }
-
-    /// The format of a file that is to be written.
-    ///
-    /// # Errors
-    /// Says which endings are known, if the name has none of them.
-    pub fn for_output(path: &Path) -> Result<Self, Failure> {
-        Self::of(path).ok_or_else(|| {
-            let path = path.display();
-            Failure::bad_input(format!("{path}: unknown format; end the name in .csv, .csv.gz or .mcap"))
-        })
-    }
-}
-
-/// What readers share: a recording under construction.
-struct Origin {
-    source: String,
-    places: Places,
-    notes: Vec<String>,
-    passed_over: Vec<String>,
-}
-
-impl Origin {
-    fn finish(self, table: build::Table) -> Result<Recording, Failure> {
-        let (t_s, columns) = table.finish();
-        if t_s.is_empty() {
-            let reason = self.notes.first().map_or(String::new(), |note| format!(" ({note})"));
-            return Err(Failure::bad_input(format!(
-                "{}: a header and no samples{reason}; record again",
-                self.source
-            )));
-        }
-        Ok(Recording {
-            source: self.source,
-            t_s: Arc::new(t_s),
-            columns,
-            places: self.places,
-            notes: self.notes,
-            passed_over: self.passed_over,
-        })
-    }
-}
-
-/// A reader that remembers how the data ended.
-struct Tail<R> {
-    inner: R,
-    bytes: u64,
-    last_byte: Option<u8>,
-    cut_short: bool,
-}
-
-impl<R: Read> Tail<R> {
-    fn new(inner: R) -> Self {
-        Self { inner, bytes: 0, last_byte: None, cut_short: false }
-    }
-}
-
-impl<R: Read> Read for Tail<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        match self.inner.read(buffer) {
-            Ok(read) => {
-                self.bytes += read as u64;
-                if let Some(last) = buffer[..read].last() {
-                    self.last_byte = Some(*last);
-                }
-                Ok(read)
-            }
-            // Compressed data that stops early: what came before is whole.
-            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
-                self.cut_short = true;
-                Ok(0)
-            }
-            Err(error) => Err(error),
         }
     }
 }

@@ -3,9 +3,11 @@
 use std::io::{self, BufRead, BufReader, Read, Write};
 
 use super::build::Table;
+use super::origin::Origin;
 use super::place::Places;
 use super::row::Cell;
-use super::{Origin, READ_BUFFER, ReadOptions, Recording, TIME_ROLE, Tail};
+use super::tail::Tail;
+use super::{READ_BUFFER, ReadOptions, Recording, TIME_ROLE};
 use crate::outcome::Failure;
 
 /// Reads a table as it streams past; linear in time, and no more memory than the columns that are kept.

@@ -16,9 +16,10 @@ use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
 use super::build::Table;
+use super::origin::Origin;
 use super::place::Places;
 use super::row::{Cell, RowColumn};
-use super::{Origin, ReadOptions, Recording, TIME_ROLE};
+use super::{ReadOptions, Recording, TIME_ROLE};
 use crate::outcome::Failure;
 
 /// Topic of the samples.

@@ -1,0 +1,74 @@
+//! Recordings from and to files.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+use super::{
+    Column, Format, READ_BUFFER, ReadOptions, Recording, RowColumn, RowWriter, comma_separated, mcap_file,
+};
+use crate::outcome::Failure;
+use crate::output;
+
+/// First bytes of gzip data.
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
+impl Recording {
+    /// Reads a file. The content decides between CSV, gzipped CSV and MCAP, whatever the file is called.
+    ///
+    /// A file that ends early (a last line without its end that makes no whole row, gzip data or an MCAP file
+    /// without its end) gives the samples that are whole and a note.
+    ///
+    /// # Errors
+    /// One line that names the file, the line or byte, the column, what was there, and what to do: no or double
+    /// `t_s` column, rows of another length than the header, cells of a channel that are no finite number, time that
+    /// does not increase, text that is not UTF-8, damaged compression, no samples.
+    pub fn load(path: &Path, options: &ReadOptions) -> Result<Self, Failure> {
+        let source = path.display().to_string();
+        let unreadable = |error: &std::io::Error| {
+            let reason = output::describe(error);
+            Failure::bad_input(format!("{source}: cannot be read: {reason}; check the path"))
+        };
+        if path.is_dir() {
+            return Err(Failure::bad_input(format!(
+                "{source}: is a folder, expected a recording; name a file"
+            )));
+        }
+        let file = File::open(path).map_err(|error| unreadable(&error))?;
+        let mut file = BufReader::with_capacity(READ_BUFFER, file);
+        let start = file.fill_buf().map_err(|error| unreadable(&error))?;
+        let named_mcap = Format::of(path).is_some_and(|format| format == Format::Mcap);
+        if start.is_empty() {
+            return Err(Failure::bad_input(format!(
+                "{source}:1: the file is empty, expected a header line with t_s; record again"
+            )));
+        }
+        if start.starts_with(mcap::MAGIC) {
+            mcap_file::read(file, source, options)
+        } else if named_mcap {
+            Err(Failure::bad_input(format!(
+                "{source}: byte 0: not the start of an MCAP file; if it is a table, call it .csv"
+            )))
+        } else if start.starts_with(&GZIP_MAGIC) {
+            comma_separated::read(flate2::bufread::MultiGzDecoder::new(file), source, options)
+        } else {
+            comma_separated::read(file, source, options)
+        }
+    }
+
+    /// Writes the recording in the format that the file name asks for: `.csv`, `.csv.gz` or `.mcap`.
+    ///
+    /// # Errors
+    /// A name that asks for no known format (see [`Format::for_output`]), or the reason why the medium refuses.
+    pub fn save(&self, path: &Path) -> Result<(), Failure> {
+        let format = Format::for_output(path)?;
+        let columns: Vec<RowColumn> = self.columns.iter().map(Column::written).collect();
+        output::write_file(path, |file| {
+            let mut writer = RowWriter::new(format, &columns, None, file)?;
+            for (sample, t_s) in self.t_s.iter().enumerate() {
+                writer.row(*t_s, self.columns.iter().map(|column| column.cell(sample)))?;
+            }
+            writer.finish()
+        })
+    }
+}
