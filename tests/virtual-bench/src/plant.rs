@@ -8,7 +8,7 @@
 
 use crate::bristle::ShaftBristle;
 use crate::config::BenchConfig;
-use crate::effects::{ActiveEffects, AsymmetricFriction};
+use crate::effects::{ActiveEffects, AsymmetricFriction, TransmissionLaw};
 use crate::sheath;
 use crate::tendon::{Contact, Material, Tendon};
 
@@ -234,9 +234,9 @@ impl Plant {
         let dt = self.config.step_s;
         self.update_bends();
         self.update_tensions();
-        let input_nm = (self.tendons[0].input_n() - self.tendons[1].input_n()) * self.config.input_radius_m;
-        let output_nm =
-            (self.tendons[0].output_n() - self.tendons[1].output_n()) * self.config.output_radius_m;
+        let [input_radius_m, output_radius_m] = self.radii_m();
+        let input_nm = (self.tendons[0].input_n() - self.tendons[1].input_n()) * input_radius_m;
+        let output_nm = (self.tendons[0].output_n() - self.tendons[1].output_n()) * output_radius_m;
         match duty {
             Some(duty) => self.advance_motor(duty, dt),
             None => self.advance_motor_open(dt),
@@ -262,6 +262,16 @@ impl Plant {
         self.advance_tendons(dt);
         self.steps += 1;
         self.clock_s = self.clock_start_s + self.steps as f64 * dt;
+    }
+
+    /// Radii of the pulleys where they stand.
+    fn radii_m(&self) -> [f64; 2] {
+        let law = self.effects.unlisted_transmission.as_ref();
+        let ratio = |kind, shaft: Shaft| law.map_or(1.0, |law| law.radius_ratio(kind, shaft.angle_rad));
+        [
+            self.config.input_radius_m * ratio(TransmissionLaw::InputLobes, self.drum),
+            self.config.output_radius_m * ratio(TransmissionLaw::OutputLobes, self.output),
+        ]
     }
 
     fn rotor_inertia_kg_m2(&self) -> f64 {
@@ -313,6 +323,9 @@ impl Plant {
         if let Some(law) = &self.effects.motor_cogging {
             rotor_nm += law.torque_nm(self.rotor.angle_rad);
         }
+        if let Some(law) = &self.effects.unlisted_motor {
+            rotor_nm += law.torque_nm(self.rotor.angle_rad, self.rotor.omega_rad_per_s, self.clock_s);
+        }
         let extra =
             self.effects.motor_viscous_friction.as_ref().map_or(0.0, |law| law.coefficient_nm_s_per_rad);
         let viscous_nm = (self.config.motor_viscous_nm_s_per_rad + extra) * self.input.omega_rad_per_s;
@@ -349,6 +362,9 @@ impl Plant {
         if let Some(law) = &effects.joint_torque_ripple {
             torque += law.torque_nm(arm.angle_rad);
         }
+        if let Some(law) = &effects.unlisted_joint {
+            torque += law.torque_nm(arm.angle_rad, arm.omega_rad_per_s, self.clock_s);
+        }
         self.arm.advance(torque, inertia, dt);
     }
 
@@ -373,12 +389,15 @@ impl Plant {
         let loss = self.effects.pretension_loss.as_ref().map_or(1.0, |law| law.factor(self.clock_s));
         for (index, tendon) in self.tendons.iter_mut().enumerate() {
             let sign = if index == 0 { -1.0 } else { 1.0 };
-            let end = |shaft: Shaft, radius_m: f64| {
-                (sign * radius_m * shaft.angle_rad, sign * radius_m * shaft.omega_rad_per_s)
+            let law = self.effects.unlisted_transmission.as_ref();
+            let end = |kind, shaft: Shaft, radius_m: f64| {
+                let plain = (shaft.angle_rad, shaft.omega_rad_per_s);
+                let (angle, omega) = law.map_or(plain, |law| law.wound(kind, plain.0, plain.1));
+                (sign * radius_m * angle, sign * radius_m * omega)
             };
             tendon.set_ends(
-                end(self.drum, self.config.input_radius_m),
-                end(self.output, self.config.output_radius_m),
+                end(TransmissionLaw::InputLobes, self.drum, self.config.input_radius_m),
+                end(TransmissionLaw::OutputLobes, self.output, self.config.output_radius_m),
             );
             let material = Material {
                 pretension_n: self.pretension_ratio[index] * (loss * self.config.pretension_n),
@@ -396,8 +415,13 @@ impl Plant {
         let sides = effects.asymmetric_friction.as_ref().map_or([1.0; 2], AsymmetricFriction::factors);
         let soft = effects.presliding_compliance.as_ref().map_or(1.0, |law| law.stiffness_ratio);
         for (index, tendon) in self.tendons.iter_mut().enumerate() {
+            let tension_ratio = 0.5 * (tendon.input_n() + tendon.output_n()) / self.config.pretension_n;
+            let varied = effects
+                .unlisted_transmission
+                .as_ref()
+                .map_or(1.0, |law| law.friction_factor(self.input.angle_rad, tension_ratio, self.clock_s));
             let contact = Contact {
-                friction_coefficient: self.config.friction_coefficient * drift * sides[index],
+                friction_coefficient: self.config.friction_coefficient * drift * sides[index] * varied,
                 bristle_stiffness_per_m: self.config.bristle_stiffness_per_m * soft,
                 stribeck: effects.sheath_stribeck_friction.as_ref(),
                 viscous: effects.sheath_viscous_friction.as_ref(),

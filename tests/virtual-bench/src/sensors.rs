@@ -101,6 +101,10 @@ impl Sensors {
         if let Some(law) = &self.effects.sensor_hum {
             sample[law.channel as usize] += law.pick_up_n(self.samples as f64 * self.period_s);
         }
+        if let Some(law) = &self.effects.unlisted_sensor {
+            let value = &mut sample[law.channel as usize];
+            *value += law.error(*value, self.samples as f64 * self.period_s);
+        }
         self.samples += 1;
         for channel in [Channel::ThetaIn, Channel::ThetaOut] {
             let value = &mut sample[channel as usize];

@@ -607,7 +607,11 @@ fn physics_outside_the_catalogue_is_marked_and_leaves_its_own_trace() {
             "torque_constant_swing",
             "joint_magnetic_detent",
             "joint_torque_ripple",
-            "sensor_hum"
+            "sensor_hum",
+            "unlisted_motor",
+            "unlisted_transmission",
+            "unlisted_joint",
+            "unlisted_sensor"
         ]
     );
 
@@ -669,4 +673,72 @@ fn physics_outside_the_catalogue_is_marked_and_leaves_its_own_trace() {
     // Held load: current goes as 1/kt; 0.8 and 1.2 of kt at 7.1 and 5.1 s.
     let current = |at: usize| mean(r.i_motor_a[at - 50..at + 50].iter().copied());
     close(current(7_000) / current(5_000), 1.5, 0.1, "current swing");
+}
+
+/// Every unlisted kind that has a torque, at points where its formula is known by hand.
+#[test]
+fn unlisted_torques_act_by_their_formulas() {
+    let reference = strokes();
+    let base = plain(&bench(), &reference);
+    let drag = UnlistedJoint { law: JointLaw::SquareDrag, size_nm: 0.1, place: 0.0 };
+    let with = run(&bench(), drag, &reference);
+    let at = |wanted: f64| {
+        mean_where(
+            base.len(),
+            |k| steady(&reference, k) && (speed(&reference, k).abs() - wanted).abs() < 0.02,
+            |k| extra_joint_nm(&with, &base, k) * speed(&reference, k).signum(),
+        )
+    };
+    // Strokes at 0.6 and 0.8 rad/s; below an encoder's step the slow ones say nothing.
+    close(at(0.6), 0.036, 0.1, "square of 0.6 rad/s");
+    close(at(0.8), 0.064, 0.1, "square of 0.8 rad/s");
+
+    let spring = UnlistedJoint { law: JointLaw::CubicSpring, size_nm: 1.0, place: 0.0 };
+    let with = run(&bench(), spring, &reference);
+    let at = |angle: f64| {
+        mean_where(
+            base.len(),
+            |k| steady(&reference, k) && (with.theta_out_rad[k] - angle).abs() < 0.02,
+            |k| extra_joint_nm(&with, &base, k),
+        )
+    };
+    close(at(0.5), 0.125, 0.1, "cube of 0.5 rad");
+    close(at(-0.5), -0.125, 0.1, "cube of -0.5 rad");
+
+    let fan = UnlistedMotor { law: MotorLaw::FanDrag, size_nm: 0.1, place: 0.0 };
+    let with = run(&bench(), fan, &reference);
+    let found = mean_where(
+        base.len(),
+        |k| steady(&reference, k) && (speed(&reference, k).abs() - 0.8).abs() < 0.02,
+        |k| extra_nm(&with, &base, k) * speed(&reference, k).signum(),
+    );
+    close(found, 0.064, 0.1, "fan at 0.8 rad/s");
+}
+
+/// `r (1 + A sin n theta)` winds `A / n (cos phase - cos(n theta + phase))` more: over a slow stroke the joint lags by that.
+#[test]
+fn lobes_of_a_pulley_show_in_the_angle_and_sensors_err_by_their_formulas() {
+    let reference = strokes();
+    let base = plain(&bench(), &reference);
+    let lobes =
+        UnlistedTransmission { law: TransmissionLaw::OutputLobes, size: 0.1, place: 4.0, phase_rad: 0.0 };
+    let with = run(&bench(), lobes, &reference);
+    let at = |angle: f64| {
+        mean_where(
+            base.len(),
+            |k| steady(&reference, k) && (with.theta_out_rad[k] - angle).abs() < 0.01,
+            |k| with.theta_out_rad[k] - base.theta_out_rad[k],
+        )
+    };
+    // The drive follows its reference: the joint stays behind by 0.025 (1 - cos 4 theta).
+    for angle in [0.3, -0.4, 0.5] {
+        close(at(angle), -0.025 * (1.0 - (4.0_f64 * angle).cos()), 0.1, "lag");
+    }
+
+    let curved = UnlistedSensor { law: SensorLaw::Curved, channel: Channel::F2, size: 3.0, place: 0.0 };
+    let with = run(&bench(), curved, &reference);
+    let k = 2_000;
+    let error = with.f2_n[k] - base.f2_n[k];
+    assert!((error - 3.0 * (base.f2_n[k] / 30.0).powi(2)).abs() < 0.1, "{error}");
+    assert_eq!(with.f1_n, base.f1_n);
 }

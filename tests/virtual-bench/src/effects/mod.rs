@@ -96,6 +96,11 @@ pub(crate) fn smooth_step(x: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
+pub use unlisted_joint::JointLaw;
+pub use unlisted_motor::MotorLaw;
+pub use unlisted_sensor::SensorLaw;
+pub use unlisted_transmission::TransmissionLaw;
+
 macro_rules! effects {
     ($($id:ident: $name:ident,)+) => {
         $(mod $id; pub use $id::$name;)+
@@ -221,4 +226,8 @@ effects! {
     joint_magnetic_detent: JointMagneticDetent,
     joint_torque_ripple: JointTorqueRipple,
     sensor_hum: SensorHum,
+    unlisted_motor: UnlistedMotor,
+    unlisted_transmission: UnlistedTransmission,
+    unlisted_joint: UnlistedJoint,
+    unlisted_sensor: UnlistedSensor,
 }
