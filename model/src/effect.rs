@@ -251,6 +251,10 @@ pub struct TransmissionPort {
     pub tendons: [TendonPort; 2],
     /// Play between the input pulley and the tendons, rad at the pulley.
     pub play_rad: f64,
+    /// Relative excess of the radius of the input and the output pulley over that of a round one, where they stand.
+    pub radius_excess: [f64; 2],
+    /// The same, integrated over the turn of the pulley from angle zero: turn of a round pulley that winds as much more, rad.
+    pub wound_excess_rad: [f64; 2],
 }
 
 /// Arm and load, seen at the joint.

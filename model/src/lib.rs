@@ -8,6 +8,7 @@ pub mod effect;
 pub mod effect_set;
 pub mod effects;
 pub mod friction_law;
+pub mod law;
 pub mod load;
 pub mod paper;
 pub mod parameters;

@@ -127,6 +127,11 @@ pub struct Transmission {
     presliding_m: [f64; 2],
     play_rad: f64,
     play_offset_rad: f64,
+    /// Radii of both pulleys over those of round ones, where they stand.
+    radius_ratio: [f64; 2],
+    /// Turn of a round pulley that has wound as much more as each pulley that is not round, rad; `None` before the first step,
+    /// which starts from tendons at the pretension whatever the angles.
+    wound_excess_rad: Option<[f64; 2]>,
 }
 
 impl Transmission {
@@ -143,6 +148,8 @@ impl Transmission {
             presliding_m: [0.0; 2],
             play_rad: 0.0,
             play_offset_rad: 0.0,
+            radius_ratio: [1.0; 2],
+            wound_excess_rad: None,
         }
     }
 
@@ -168,23 +175,29 @@ impl Transmission {
     #[must_use]
     pub fn torque_in_nm(&self, config: &TransmissionConfig) -> f64 {
         let [f1, _, f3, _] = self.end_tensions_n(config);
-        (f1 - f3) * config.pulleys.input_radius_m
+        (f1 - f3) * self.radius_m(config, End::Input)
     }
 
     /// Torque of the cables on the output pulley, `T_out = (F2 - F4) r2` (Eq. (5)), N·m.
     #[must_use]
     pub fn torque_out_nm(&self, config: &TransmissionConfig) -> f64 {
         let [_, f2, _, f4] = self.end_tensions_n(config);
-        (f2 - f4) * config.pulleys.output_radius_m
+        (f2 - f4) * self.radius_m(config, End::Output)
+    }
+
+    /// Radius of a pulley where it stands, m.
+    fn radius_m(&self, config: &TransmissionConfig, end: End) -> f64 {
+        let round_m = match end {
+            End::Input => config.pulleys.input_radius_m,
+            End::Output => config.pulleys.output_radius_m,
+        };
+        round_m * self.radius_ratio[end as usize]
     }
 
     /// Slope of the torque over a turn of one pulley, N·m/rad, from the last move of that pulley.
     #[must_use]
     pub fn stiffness_nm_per_rad(&self, config: &TransmissionConfig, end: End) -> f64 {
-        let radius_m = match end {
-            End::Input => config.pulleys.input_radius_m,
-            End::Output => config.pulleys.output_radius_m,
-        };
+        let radius_m = self.radius_m(config, end);
         let [a, b] = &self.tendons;
         (a.end_stiffness_n_per_m(end) + b.end_stiffness_n_per_m(end)) * radius_m * radius_m
     }
@@ -210,6 +223,8 @@ impl Transmission {
             pretension_n: config.tendon.pretension_n,
             tendons: [config.nominal_tendon_port(); 2],
             play_rad: 0.0,
+            radius_excess: [0.0; 2],
+            wound_excess_rad: [0.0; 2],
         };
         for (index, (tendon, sign)) in port.tendons.iter_mut().zip(CABLE_SIGN).enumerate() {
             tendon.speed_m_s = [
@@ -240,6 +255,24 @@ impl Transmission {
             self.presliding_m[index] = tendon.presliding_m;
         }
         self.play_rad = port.play_rad;
+        self.follow_radii(config, &port);
+    }
+
+    /// Takes the radii of pulleys that are not round where they stand now.
+    ///
+    /// During a turn the radius at its start counts. What that leaves out is made up for here, so that a pulley which comes
+    /// back to an angle has wound what it had there before, however long the steps.
+    fn follow_radii(&mut self, config: &TransmissionConfig, port: &TransmissionPort) {
+        let wound_rad = self.wound_excess_rad.unwrap_or(port.wound_excess_rad);
+        for (index, end) in [End::Input, End::Output].into_iter().enumerate() {
+            let missing_rad = port.wound_excess_rad[index] - wound_rad[index];
+            if missing_rad != 0.0 {
+                self.radius_ratio[index] = 1.0;
+                self.turn(config, end, missing_rad);
+            }
+            self.radius_ratio[index] = 1.0 + port.radius_excess[index];
+        }
+        self.wound_excess_rad = Some(port.wound_excess_rad);
     }
 
     /// Turns the input pulley by `delta_rad`.
@@ -300,9 +333,13 @@ impl Transmission {
     }
 
     fn turn(&mut self, config: &TransmissionConfig, end: End, delta_rad: f64) {
+        let wound_m = self.radius_m(config, end) * delta_rad;
+        if let Some(wound_rad) = &mut self.wound_excess_rad {
+            wound_rad[end as usize] += (self.radius_ratio[end as usize] - 1.0) * delta_rad;
+        }
         let pull_m = match end {
-            End::Input => config.pulleys.input_radius_m * delta_rad,
-            End::Output => -config.pulleys.output_radius_m * delta_rad,
+            End::Input => wound_m,
+            End::Output => -wound_m,
         };
         for (index, sign) in CABLE_SIGN.into_iter().enumerate() {
             let limits = &self.limits[index][end as usize];

@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use bowden_core::diagnose::diagnose;
-use bowden_core::diagnose::verdict::{Diagnosis, NamedEffect, Verdict};
+use bowden_core::diagnose::verdict::{Diagnosis, FoundLaw, NamedEffect, Verdict};
 use bowden_core::progress::Quiet;
 use bowden_core::recording::Recording;
 use bowden_core::replay;
@@ -20,9 +20,9 @@ use bowden_tests::prove::recorded::Recorded;
 use bowden_tests::prove::truth::TRAINING_S;
 use bowden_tests::{recording_of, rms_difference};
 use virtual_bench::{
-    Case, ConcealedEffect, EndStopContact, GearBacklash, JointBacklash, JointTorqueRipple,
+    Case, ConcealedEffect, EndStopContact, GearBacklash, JointBacklash, JointLaw, JointTorqueRipple,
     JointViscousFriction, MotionKind, MotorCoulombFriction, MotorStribeckFriction, Parameter, PretensionLoss,
-    SensorGainError,
+    SensorGainError, TransmissionLaw, UnlistedJoint, UnlistedTransmission,
 };
 
 /// Length of the diagnosed recordings, s.
@@ -95,6 +95,21 @@ impl Outcome {
         };
         assert_eq!((effect.id.as_str(), effect.component.as_str()), (id, component));
         effect
+    }
+
+    /// Nothing is named, and one law is stated, of `variable` at `port`, which the diagnosed rig simulates.
+    #[track_caller]
+    fn states_only(&self, port: &str, variable: &str) -> &FoundLaw {
+        let diagnosis = &self.diagnosis;
+        let [law] = &diagnosis.laws[..] else {
+            panic!("{:?} beside {:?}", diagnosis.laws, diagnosis.effects)
+        };
+        assert_eq!((law.port.as_str(), &law.variables[..]), (port, &[variable.to_owned()][..]));
+        assert_eq!((diagnosis.verdict, &diagnosis.effects[..]), (Verdict::Unexplained, &[][..]));
+        let unexplained = diagnosis.unexplained.as_ref().unwrap();
+        assert!(unexplained.modelled && unexplained.law.as_ref().unwrap().contains(&law.formula));
+        assert_eq!(unexplained.component, law.component);
+        law
     }
 
     /// Asserts that the diagnosed rig leaves at most `share` of the rig's error in the second recording.
@@ -272,6 +287,41 @@ fn physics_beyond_the_fixed_list_is_named_where_it_is_asked_for_and_only_there()
 
     let unasked = Outcome::of(&case);
     assert!(unasked.diagnosis.effects.iter().all(|effect| effect.id != "joint_torque_ripple"));
+    let law = unasked.states_only("joint_torque_nm", "theta_out_rad");
+    for (name, concealed, tolerance) in
+        [("amplitude_nm", 0.14, 0.2 * 0.14), ("cycles_per_turn", 20.0, 0.03 * 20.0), ("phase_rad", 1.0, 0.3)]
+    {
+        let found = law.coefficients[name].value;
+        assert!((found - concealed).abs() < tolerance, "{name}: {found} for {concealed}");
+    }
+}
+
+/// Drag with the square of speed looks like viscous friction with a wrong speed; the exponent says that it is not. The bench puts
+/// 0.08 N·m at 1 rad/s. Viscous friction alone would leave an exponent of 1.
+#[test]
+fn drag_with_the_square_of_speed_is_put_into_a_formula() {
+    let drag = UnlistedJoint { law: JointLaw::SquareDrag, size_nm: 0.08, place: 0.0 };
+    let outcome = Outcome::of(&Case::new("case", vec![drag.into()], 114, 3.0));
+    let law = outcome.states_only("joint_friction_nm", "omega_out_rad_s");
+    let found = |name: &str| law.coefficients[name].value;
+    assert!((found("exponent") - 2.0).abs() < 0.25, "{:?}", law.coefficients);
+    assert!((found("amplitude_nm") - 0.08).abs() < 0.01, "{:?}", law.coefficients);
+    outcome.predicts_within(0.5);
+}
+
+#[test]
+fn an_output_pulley_that_is_not_round_is_put_into_a_formula() {
+    let lobes =
+        UnlistedTransmission { law: TransmissionLaw::OutputLobes, size: 0.12, place: 6.0, phase_rad: 0.4 };
+    let outcome = Outcome::of(&Case::new("case", vec![lobes.into()], 115, 3.0));
+    let law = outcome.states_only("output_radius", "theta_out_rad");
+    for (name, concealed, tolerance) in
+        [("amplitude", 0.12, 0.02), ("cycles_per_turn", 6.0, 0.4), ("phase_rad", 0.4, 0.15)]
+    {
+        let found = law.coefficients[name].value;
+        assert!((found - concealed).abs() < tolerance, "{name}: {found} for {concealed}");
+    }
+    outcome.predicts_within(0.5);
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod afterwards;
 mod candidates;
 mod constancy;
 mod experiment;
+mod law_candidates;
 mod layout;
 mod locked;
 mod onset;
@@ -20,6 +21,7 @@ mod residual_map;
 mod screening;
 mod selection;
 mod stages;
+mod stated_laws;
 mod unexplained;
 pub mod verdict;
 mod words;
@@ -28,6 +30,7 @@ use std::collections::BTreeMap;
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
+use bowden_model::law;
 
 use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
@@ -307,10 +310,16 @@ impl Case<'_> {
         let bearable = Bearable { shown, allowed: self.allowed, scales: objective.scales() };
         let mut experiments = Vec::new();
         let mut effects = Vec::new();
+        let mut laws = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
             let active = last.model.effects[own + index];
             let count = active.descriptor().parameters.iter().filter(|spec| spec.searched).count();
             let values = first_value..first_value + count;
+            first_value += Layout::of_found(&last.model, own + index).len();
+            if let Some(law) = law::of(&active) {
+                laws.push((stated_laws::stated(law, &active, chosen, &last.stds[values]), active));
+                continue;
+            }
             let separate = |tried: &Tried| {
                 let found = experiment::separating(rig, chosen, tried, &bearable, clock_s)?;
                 let words = found.in_words();
@@ -318,8 +327,9 @@ impl Case<'_> {
                 Some(words)
             };
             effects.push(named(active, chosen, &last.stds[values], objective, separate));
-            first_value += Layout::of_found(&last.model, own + index).len();
         }
+        let mismatch = place::mismatch(objective, &stages.recalibrated.residuals);
+        let unexplained = stated_laws::unexplained(&laws, unexplained, &mismatch);
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let wrong = recalibrated_parameters.iter().any(Recalibrated::is_wrong);
         let [loss_before, loss_recalibrated, loss_after] =
@@ -357,9 +367,10 @@ impl Case<'_> {
             recalibrated: recalibrated_parameters,
             indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model)
                 .unwrap_or_default(),
-            mismatch: place::mismatch(objective, &stages.recalibrated.residuals),
+            mismatch,
             residual_map: residual_map::residual_map(objective, stages),
             unexplained,
+            laws: laws.into_iter().map(|(law, _)| law).collect(),
             fit: Fit { heldout: true, channels },
             heldout_loss: HeldOutLoss {
                 before: loss_before,

@@ -10,6 +10,7 @@ mod envelope;
 pub mod figures;
 pub mod files;
 mod free_form;
+mod laws;
 mod map;
 pub mod names;
 pub mod page;

@@ -18,6 +18,7 @@
 
 mod document;
 mod effects;
+mod laws;
 mod parameter;
 mod parse;
 mod plausible;

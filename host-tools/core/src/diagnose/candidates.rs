@@ -70,7 +70,7 @@ pub fn candidates(
     found
 }
 
-fn fits(model: &JointModel, component: Component) -> bool {
+pub(super) fn fits(model: &JointModel, component: Component) -> bool {
     match component {
         // Without a motor, its effects are the friction of an input spindle that is turned as prescribed.
         Component::Motor => model.parameters.motor.is_some() || model.outputs.contains(&Channel::TorqueIn),
@@ -79,11 +79,11 @@ fn fits(model: &JointModel, component: Component) -> bool {
     }
 }
 
-fn overlaps(a: Target, b: Target) -> bool {
+pub(super) fn overlaps(a: Target, b: Target) -> bool {
     Channel::ALL.into_iter().any(|channel| a.includes(channel) && b.includes(channel))
 }
 
-fn targets(model: &JointModel, descriptor: &Descriptor) -> Vec<Target> {
+pub(super) fn targets(model: &JointModel, descriptor: &Descriptor) -> Vec<Target> {
     if descriptor.channels.is_empty() {
         return vec![Target::None];
     }

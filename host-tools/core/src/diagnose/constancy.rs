@@ -38,6 +38,8 @@ pub(super) fn inconstant(
         period_rad: None,
         frequency_hz: None,
         free_form: None,
+        modelled: false,
+        law: None,
         sentence,
     })
 }

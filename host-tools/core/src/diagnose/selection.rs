@@ -1,12 +1,16 @@
 //! Which effects the data ask for: forward, the best candidate at a time, judged on what the fit has not seen; then
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 
+mod laws;
+
 use std::cmp::Ordering;
 
 use bowden_model::effect::ActiveEffect;
+use bowden_model::law;
 use rayon::prelude::*;
 
 use super::candidates::candidates;
+use super::law_candidates::law_candidates;
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
 use super::onset::between_recordings;
@@ -164,15 +168,16 @@ pub fn select(
     let mut rounds = Vec::new();
     while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
         let before = search.without_exhausted(&present)?;
-        let (record, fits) = search.one_more(&before)?;
+        let (record, fits) = search.one_more(&before, Kind::Name)?;
         rounds.push(Round { loss_before: before.loss, candidates: record });
-        let Some((found, with)) = search.found(&before, &present, fits)? else { break };
+        let Some((found, with)) = search.found(&before, &present, fits, worthwhile)? else { break };
         chosen.push(found);
         present = with;
     }
     if !progress.interrupted() {
         search.prune(&mut present, &mut chosen)?;
     }
+    search.add_laws(&mut present, &mut chosen, &mut rounds)?;
     let model = present.without_ordinary();
     let searched = present.solution.model;
     let ordinary = present.layout.ordinary(&searched).to_vec();
@@ -201,12 +206,23 @@ struct Losses {
     with_both: f64,
 }
 
+/// Whether what brings the held-out loss from one value to another is worth it.
+type Worth = fn(f64, f64) -> bool;
+
+/// What a round tries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// Effects of the catalogue.
+    Name,
+    /// Closed forms at the ports of the joint.
+    Law,
+}
+
 impl Losses {
-    /// Whether the candidate is found: it is worth a name, and either does better than the ordinary in its place or is worth
-    /// a name beside it.
-    fn found(self) -> bool {
-        worthwhile(self.before, self.with)
-            && (self.replaces_ordinary() || worthwhile(self.ordinary, self.with_both))
+    /// Whether the candidate is found: it is worth it, and either does better than the ordinary in its place or is worth it
+    /// beside that.
+    fn found(self, worth: Worth) -> bool {
+        worth(self.before, self.with) && (self.replaces_ordinary() || worth(self.ordinary, self.with_both))
     }
 
     fn replaces_ordinary(self) -> bool {
@@ -297,10 +313,11 @@ impl Search<'_> {
         before: &Fitted,
         present: &Fitted,
         mut fits: Vec<Fitted>,
+        worth: Worth,
     ) -> Result<Option<(Chosen, Fitted)>, Failure> {
         let finalists = if before.layout == present.layout { 1 } else { FINALISTS };
         let finalists = &fits[..finalists.min(fits.len())];
-        if !finalists.iter().any(|fitted| worthwhile(before.loss, fitted.loss)) {
+        if !finalists.iter().any(|fitted| worth(before.loss, fitted.loss)) {
             return Ok(None);
         }
         let mut beside: Vec<Fitted> = finalists
@@ -317,7 +334,7 @@ impl Search<'_> {
             ordinary: present.loss,
             with_both: with_ordinary.loss,
         };
-        if !losses.found() {
+        if !losses.found(worth) {
             return Ok(None);
         }
         // Those that were not fitted beside the ordinary are taken to gain by it as the best did.
@@ -337,11 +354,15 @@ impl Search<'_> {
 
     /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
     /// fitted to the end. Returns all candidates for the record, and the fits, best first.
-    fn one_more(&self, present: &Fitted) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
+    fn one_more(&self, present: &Fitted, kind: Kind) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
         let Self { objective, progress, .. } = *self;
         let ranked = {
             let predictions = objective.predict(&present.solution.model)?;
-            let all = candidates(&present.without_ordinary(), objective, &predictions, self.asked);
+            let model = present.without_ordinary();
+            let all = match kind {
+                Kind::Name => candidates(&model, objective, &predictions, self.asked),
+                Kind::Law => law_candidates(&model, objective, &predictions),
+            };
             progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
             let Fitted { layout, solution, .. } = present;
             let present = Present { believed: self.believed, solution, layout, predictions: &predictions };
@@ -495,6 +516,10 @@ pub fn worthwhile(before: f64, after: f64) -> bool {
 /// to be told.
 fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffect) -> bool {
     let descriptor = effect.descriptor();
+    // How large a law usually is nobody knows; the loss alone decides.
+    if law::of(effect).is_some() {
+        return false;
+    }
     let Some(strength) = descriptor.parameters.first() else { return false };
     let usual = typical(believed, descriptor.component, strength);
     let value = effect.parameters[0];
@@ -630,7 +655,7 @@ mod tests {
             ([1.03, 1.0, 0.67, 0.48], false),
         ] {
             let [before, with, ordinary, with_both] = losses;
-            assert_eq!(Losses { before, with, ordinary, with_both }.found(), found, "{losses:?}");
+            assert_eq!(Losses { before, with, ordinary, with_both }.found(worthwhile), found, "{losses:?}");
         }
     }
 }

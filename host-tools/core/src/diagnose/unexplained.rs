@@ -5,9 +5,9 @@
 //! the rest.
 
 mod locate;
-mod samples;
+pub(super) mod samples;
 mod shape;
-mod structure;
+pub(super) mod structure;
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -110,6 +110,8 @@ fn described(samples: &Samples, left: &Left, forms: &[(Shape, Fitted)]) -> Unexp
         period_rad,
         frequency_hz,
         free_form,
+        modelled: false,
+        law: None,
     }
 }
 

@@ -183,6 +183,31 @@ pub struct Unexplained {
     pub frequency_hz: Option<f64>,
     /// A free form that takes a part of it off held-out data; no physics, and not in the diagnosed rig.
     pub free_form: Option<FreeForm>,
+    /// Whether the diagnosed rig simulates it, as the law below.
+    pub modelled: bool,
+    /// The law that describes it: port, formula and coefficients with units.
+    pub law: Option<String>,
+    /// One plain sentence.
+    pub sentence: String,
+}
+
+/// Physics without a name that the diagnosis stands behind: a closed form at one port of the joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundLaw {
+    /// Part of the joint.
+    pub component: String,
+    /// Where it acts: the name that `[[law]]` of a rig file has for it.
+    pub port: String,
+    /// On what it depends.
+    pub variables: Vec<String>,
+    /// Channel, for a law of a sensor.
+    pub channel: Option<String>,
+    /// Formula as a rig file writes it.
+    pub formula: String,
+    /// Coefficients.
+    pub coefficients: BTreeMap<String, Estimate>,
+    /// Part of the held-out loss that it removes, 0 to 1.
+    pub heldout_improvement: f64,
     /// One plain sentence.
     pub sentence: String,
 }
@@ -300,6 +325,8 @@ pub struct Diagnosis {
     pub residual_map: ResidualMap,
     /// What no named effect explains.
     pub unexplained: Option<Unexplained>,
+    /// Laws that describe a part of it, as the diagnosed rig simulates them.
+    pub laws: Vec<FoundLaw>,
     /// Scores.
     pub fit: Fit,
     /// Loss over all channels on held-out data.

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::diagnose::verdict::{Diagnosis, Findings, NamedEffect};
 
-use super::{figures, free_form, names};
+use super::{figures, free_form, laws, names};
 
 /// Section on physics.
 pub(super) fn section(findings: &Findings) -> Markup {
@@ -16,7 +16,10 @@ pub(super) fn section(findings: &Findings) -> Markup {
                 p { "No effect of the catalogue is named." }
             }
             @for effect in &diagnosis.effects { (card(effect)) }
-            @if let Some(left) = &diagnosis.unexplained { (free_form::card(left)) }
+            @for law in &diagnosis.laws { (laws::card(law)) }
+            @if let Some(left) = diagnosis.unexplained.as_ref().filter(|left| !left.modelled) {
+                (free_form::card(left))
+            }
             (recalibrated(diagnosis))
             @if !diagnosis.indistinguishable.is_empty() {
                 h3 { "Parameters that these data cannot tell apart" }

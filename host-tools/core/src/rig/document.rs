@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use bowden_model::effect::{ActiveEffect, Target};
+use bowden_model::law;
 use bowden_model::parameters::nominal;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
 
 use super::effects::CHANNEL_KEY;
-use super::{Rig, read_text};
+use super::{Rig, laws, read_text};
 use crate::outcome::Failure;
 use crate::output;
 
@@ -65,7 +66,7 @@ impl RigDocument {
         Ok(())
     }
 
-    /// Adds an effect, or replaces the parameters of the same effect on the same sensor.
+    /// Adds an effect or a law, or replaces the parameters of the same one on the same sensor.
     ///
     /// # Errors
     /// Exit status 1, if a parameter is outside its range, or if the file already has the effect in a form that
@@ -84,6 +85,9 @@ impl RigDocument {
     fn insert_effect(&mut self, active: &ActiveEffect) -> Result<(), Failure> {
         let id = active.descriptor().id;
         let refuse = |what: &str| Failure::failed(format!("{}: {what} cannot take effect {id}", self.source));
+        if let Some(law) = law::of(active) {
+            return laws::insert(&mut self.document, law, active).ok_or_else(|| refuse("law"));
+        }
         let simulation = section_mut(&mut self.document, "simulation").ok_or_else(|| refuse("simulation"))?;
         let list = simulation.entry("effects").or_insert_with(|| Item::Value(Value::Array(Array::new())));
         let list = list.as_array_mut().ok_or_else(|| refuse("simulation.effects"))?;
@@ -97,8 +101,9 @@ impl RigDocument {
         Ok(())
     }
 
-    /// Removes all effects.
+    /// Removes all effects and laws.
     pub fn clear_effects(&mut self) {
+        self.document.remove(laws::KEY);
         if let Some(list) = self
             .document
             .get_mut("simulation")

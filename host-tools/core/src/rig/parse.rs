@@ -10,11 +10,11 @@ use toml::de::{DeTable, DeValue};
 
 use super::roles::can_drive;
 use super::section::{Bounds, FINITE, Section, Source, advice};
-use super::{ProportionalLaw, Rig, SCHEMA, effects};
+use super::{ProportionalLaw, Rig, SCHEMA, effects, laws};
 use crate::outcome::Failure;
 use crate::recording::{ColumnMap, ColumnSource, TIME_ROLE};
 
-const SECTIONS: [&str; 13] = [
+const SECTIONS: [&str; 14] = [
     "schema",
     "name",
     "motor",
@@ -25,6 +25,7 @@ const SECTIONS: [&str; 13] = [
     "sensors",
     "simulation",
     "effects",
+    laws::KEY,
     "controller",
     "recording",
     "replay",
@@ -99,7 +100,7 @@ pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
     Ok(Rig {
         name: file.string("name")?.map_or_else(|| "unnamed".to_owned(), |(name, _)| name.to_owned()),
         joint,
-        effects: effects::read(&file, simulation.as_ref())?,
+        effects: [effects::read(&file, simulation.as_ref())?, laws::read(&file)?].concat(),
         controller: section("controller")?.as_ref().map(read_controller).transpose()?,
         elements,
         step_s,

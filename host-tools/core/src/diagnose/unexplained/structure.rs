@@ -130,6 +130,50 @@ fn most(forms: &[(Shape, Fitted)]) -> f64 {
     forms.iter().map(|(_, fitted)| fitted.removed()).fold(0.0, f64::max)
 }
 
+/// Most rates that [`rates_along`] and [`frequencies_hz`] yield.
+const MOST_STARTS: usize = 2;
+
+/// Radians of a wave per radian of a position in which what is left of any series repeats most clearly, the clearest first.
+pub(crate) fn rates_along(samples: &Samples, of: Variable) -> Vec<f64> {
+    clearest(samples.left.par_iter().filter_map(|left| {
+        let shape = period(samples, left, of)?;
+        rate_and_gain(shape, samples, left)
+    }))
+}
+
+/// Frequencies at which what is left of any series, or of one alone, swings most clearly, Hz, the clearest first.
+pub(crate) fn frequencies_hz(samples: &Samples, of: Option<Series>) -> Vec<f64> {
+    let rates = clearest(samples.left.par_iter().filter_map(|left| {
+        let shape = of
+            .is_none_or(|series| series == left.series)
+            .then(|| frequency(samples, left, Factor::One))??;
+        rate_and_gain(shape, samples, left)
+    }));
+    rates.into_iter().map(|rate| rate / TAU).collect()
+}
+
+/// Rate of a wave, and how much it takes off what is left of a series.
+fn rate_and_gain(shape: Shape, samples: &Samples, left: &Left) -> Option<(f64, f64)> {
+    let gain = shape.fit(samples, &left.soft)?.removed();
+    match shape {
+        Shape::Wave { rate, .. } if gain > 0.0 => Some((rate, gain)),
+        _ => None,
+    }
+}
+
+/// The rates with the largest gains that differ by more than a tenth.
+fn clearest(rates: impl ParallelIterator<Item = (f64, f64)>) -> Vec<f64> {
+    let mut rates: Vec<(f64, f64)> = rates.collect();
+    rates.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+    let mut kept: Vec<f64> = Vec::new();
+    for (rate, _) in rates {
+        if kept.len() < MOST_STARTS && kept.iter().all(|other| (rate / other).ln().abs() > 0.1) {
+            kept.push(rate);
+        }
+    }
+    kept
+}
+
 /// Every form that can be fitted to a series, those with few numbers first.
 fn tried(samples: &Samples, left: &Left) -> impl Iterator<Item = (Shape, Fitted)> {
     let curve = |of, nodes, times| Shape::Curve { of, nodes, times };

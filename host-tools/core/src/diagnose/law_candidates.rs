@@ -1,0 +1,173 @@
+//! Laws that the parts of a joint can have, and where to start: places and periods are read off what is left.
+
+use bowden_model::channel::Channel;
+use bowden_model::effect::{ActiveEffect, Effect, Target};
+use bowden_model::law::{self, Form, LAWS, Law, Variable};
+
+use super::candidates::{Candidate, fits, overlaps, targets};
+use super::unexplained::samples::{Samples, Variable as Seen};
+use super::unexplained::structure::{frequencies_hz, rates_along};
+use crate::fit::objective::{Objective, Series};
+use crate::fit::typical::sized;
+use crate::joint_model::JointModel;
+use crate::simulation::Prediction;
+
+/// Exponents at which a power of speed or angle is tried.
+const EXPONENTS: [f64; 3] = [0.5, 2.0, 3.0];
+
+/// Places along the travel among which those are sought at which most is left, and how many of them a bump is tried at.
+const PLACES: usize = 9;
+const PLACES_TRIED: usize = 3;
+
+/// Half width of such a bump, as a part of the travel.
+const WIDTH: f64 = 0.08;
+
+/// Time constants at which something that sets in is tried, as parts of the recordings' length.
+const SETTING_IN: [f64; 2] = [0.05, 0.3];
+
+/// Phases of a wave; the others are these with the other sign.
+const PHASES_RAD: [f64; 2] = [0.0, std::f64::consts::FRAC_PI_2];
+
+/// What is known of the motion and of what is left, for all laws.
+struct Ground<'a> {
+    objective: &'a Objective,
+    samples: Samples,
+    input_rates: Vec<f64>,
+    joint_rates: Vec<f64>,
+    frequencies_hz: Vec<f64>,
+}
+
+/// All laws that the parts of `model` can have and that it does not contain yet. `predictions` are those of the model with all
+/// that was found.
+#[must_use]
+pub(super) fn law_candidates(
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Vec<Candidate> {
+    let samples = Samples::new(objective, predictions);
+    let ground = Ground {
+        objective,
+        input_rates: rates_along(&samples, Seen::ThetaIn),
+        joint_rates: rates_along(&samples, Seen::ThetaOut),
+        frequencies_hz: frequencies_hz(&samples, None),
+        samples,
+    };
+    let mut found = Vec::new();
+    for law in LAWS.iter().filter(|law| fits(model, law.descriptor().component)) {
+        let seen = |target: &Target| match target {
+            Target::One(channel) => ground.samples.of(Series::Channel(*channel)).is_some(),
+            _ => true,
+        };
+        for target in targets(model, law.descriptor()).into_iter().filter(seen) {
+            let contained = model.effects.iter().any(|active| {
+                law::of(active).is_some_and(|other| other.port() == law.port() && other.form() == law.form())
+                    && (target == Target::None || overlaps(active.target, target))
+            });
+            if contained {
+                continue;
+            }
+            let starts = ground.starts(law, ActiveEffect { target, ..sized(model, law) });
+            if !starts.is_empty() {
+                found.push(Candidate { starts });
+            }
+        }
+    }
+    found
+}
+
+impl Ground<'_> {
+    fn starts(&self, law: &Law, base: ActiveEffect) -> Vec<ActiveEffect> {
+        match law.form() {
+            Form::Ramp | Form::Square => vec![base],
+            Form::PowerFromOne => vec![base.with("exponent", 1.0)],
+            Form::Power | Form::EvenPower => {
+                let usual = self.usual(law.variable());
+                let size = base.parameters[0];
+                let start = |exponent: &f64| {
+                    base.with("exponent", *exponent).with("amplitude_nm", size / usual.powf(*exponent))
+                };
+                if usual > 0.0 { EXPONENTS.iter().map(start).collect() } else { Vec::new() }
+            }
+            Form::Wave => {
+                let rates = match law.variable() {
+                    Variable::InputAngle => &self.input_rates,
+                    Variable::Value if base.target == Target::One(Channel::ThetaIn) => &self.input_rates,
+                    _ => &self.joint_rates,
+                };
+                waves(base, "cycles_per_turn", rates)
+            }
+            Form::Oscillation => {
+                let own = match base.target {
+                    Target::One(channel) => frequencies_hz(&self.samples, Some(Series::Channel(channel))),
+                    _ => self.frequencies_hz.clone(),
+                };
+                waves(base, "frequency_hz", &own)
+            }
+            Form::Bump => {
+                let Some((low, high)) = self.travel(law.variable()) else { return Vec::new() };
+                let base = base.with("width_rad", WIDTH * (high - low));
+                let places = self.where_most_is_left(law.variable(), low, high);
+                places.into_iter().map(|place| base.with("at_rad", place)).collect()
+            }
+            Form::Decay => {
+                let duration_s = self.objective.duration_s();
+                SETTING_IN.map(|part| base.with("time_constant_s", part * duration_s)).to_vec()
+            }
+        }
+    }
+
+    /// Angle that a law depends on, or whose speed it depends on, as measured over all recordings.
+    fn angle(&self, variable: Variable) -> Option<&[f64]> {
+        let seen = match variable {
+            Variable::JointAngle | Variable::JointSpeed => Seen::ThetaOut,
+            _ => Seen::ThetaIn,
+        };
+        // A joint without an encoder of its own goes where the input takes it.
+        self.samples.variable(seen).or_else(|| self.samples.variable(Seen::ThetaIn))
+    }
+
+    /// Ends of the travel; `None` where the joint hardly moves.
+    fn travel(&self, variable: Variable) -> Option<(f64, f64)> {
+        /// Least travel with places to tell apart, rad.
+        const LEAST_RAD: f64 = 0.05;
+        let angle = self.angle(variable)?.iter();
+        let (low, high) = angle.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        (high - low > LEAST_RAD).then_some((low, high))
+    }
+
+    /// Middles of the parts of the travel from `low` to `high` in which the mean square of what is left of all series is largest.
+    fn where_most_is_left(&self, variable: Variable, low: f64, high: f64) -> Vec<f64> {
+        let mut parts = [(0.0, 0.0); PLACES];
+        for (row, angle) in self.angle(variable).unwrap_or_default().iter().enumerate() {
+            let part = (PLACES as f64 * (angle - low) / (high - low)) as usize;
+            let (sum, count) = &mut parts[part.min(PLACES - 1)];
+            for left in self.samples.left.iter().filter(|left| left.soft[row].is_finite()) {
+                *sum += left.soft[row].powi(2);
+                *count += 1.0;
+            }
+        }
+        let mean = |part: &usize| parts[*part].0 / f64::max(parts[*part].1, 1.0);
+        let mut order: Vec<usize> = (0..PLACES).collect();
+        order.sort_by(|a, b| mean(b).total_cmp(&mean(a)));
+        let middle = |part: &usize| low + (high - low) * (*part as f64 + 0.5) / PLACES as f64;
+        order.iter().take(PLACES_TRIED).map(middle).collect()
+    }
+
+    /// Root mean square of an angle or a speed.
+    fn usual(&self, variable: Variable) -> f64 {
+        let values = match variable {
+            Variable::JointAngle => self.angle(variable),
+            // Joint and input turn alike but for the ratio of the pulleys, which the amplitude takes up.
+            _ => self.samples.variable(Seen::Speed),
+        };
+        let values = values.unwrap_or_default();
+        (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    }
+}
+
+/// At every rate, both phases.
+fn waves(base: ActiveEffect, name: &str, rates: &[f64]) -> Vec<ActiveEffect> {
+    let at = |rate: &f64| PHASES_RAD.map(|phase_rad| base.with(name, *rate).with("phase_rad", phase_rad));
+    rates.iter().flat_map(at).collect()
+}

@@ -1,0 +1,91 @@
+//! Laws that were found, in words and numbers.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use bowden_model::effect::ActiveEffect;
+use bowden_model::law::{self, Form, Law};
+
+use super::selection::Chosen;
+use super::verdict::{Estimate, FoundLaw, Mismatch, Unexplained};
+use super::words::short;
+
+/// A law as it was fitted, `stds` being the standard deviations of its coefficients.
+pub(super) fn stated(law: &Law, active: &ActiveEffect, chosen: &Chosen, stds: &[Option<f64>]) -> FoundLaw {
+    let descriptor = active.descriptor();
+    let coefficients: BTreeMap<String, Estimate> = descriptor
+        .parameters
+        .iter()
+        .zip(active.parameters)
+        .zip(stds)
+        .map(|((spec, value), std)| {
+            let at_bound = value <= spec.lower || value >= spec.upper;
+            (spec.name.to_owned(), Estimate { value, std: *std, unit: spec.unit.to_owned(), at_bound })
+        })
+        .collect();
+    let heldout_improvement = 1.0 - chosen.loss_after / chosen.loss_before;
+    let mut found = FoundLaw {
+        component: descriptor.component.name().to_owned(),
+        port: law.port().name().to_owned(),
+        variables: vec![law.variable().name().to_owned()],
+        channel: active.target.name().map(str::to_owned),
+        formula: law.formula().to_owned(),
+        coefficients,
+        heldout_improvement,
+        sentence: String::new(),
+    };
+    let mut meaning = law.port().meaning().chars();
+    let first: String = meaning.next().into_iter().flat_map(char::to_uppercase).collect();
+    found.sentence = format!(
+        "{first}{}{}: {}. It {} {}; it removes {:.0} % of the difference on data the fit did not see.",
+        meaning.as_str(),
+        found.channel.as_ref().map_or_else(String::new, |channel| format!(" ({channel})")),
+        in_numbers(&found),
+        law.form().behaviour(),
+        law.variable().name(),
+        100.0 * heldout_improvement
+    );
+    found
+}
+
+/// Port, formula and coefficients in one line.
+fn in_numbers(law: &FoundLaw) -> String {
+    let mut text = format!("{} = {}", law.port, law.formula);
+    for (place, (name, value)) in law.coefficients.iter().enumerate() {
+        let before = if place == 0 { " with" } else { "," };
+        let spread = value.std.map_or_else(String::new, |std| format!(" ± {}", short(std)));
+        let unit = if value.unit == "1" { String::new() } else { format!(" {}", value.unit) };
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{before} {name} = {}{spread}{unit}", short(value.value));
+    }
+    text
+}
+
+/// What no name explains, where laws describe it; `left` is what not even they do.
+pub(super) fn unexplained(
+    laws: &[(FoundLaw, ActiveEffect)],
+    left: Option<Unexplained>,
+    mismatch: &[Mismatch],
+) -> Option<Unexplained> {
+    let Some((first, active)) = laws.first() else { return left };
+    let answers = mismatch.iter().find(|mismatch| mismatch.component == first.component);
+    let channel = first.channel.clone().or_else(|| Some(answers.or(mismatch.first())?.channel.clone()));
+    let coefficient = |name: &str| first.coefficients.get(name).map(|value| value.value);
+    let law = law::of(active)?;
+    let sentences: Vec<&str> = laws.iter().map(|(law, _)| law.sentence.as_str()).collect();
+    let rest = left.map(|left| format!(" What is left then: {}", left.sentence)).unwrap_or_default();
+    Some(Unexplained {
+        component: first.component.clone(),
+        channel: channel.unwrap_or_default(),
+        depends_on: first.variables.clone(),
+        period_rad: coefficient("cycles_per_turn").map(|cycles| std::f64::consts::TAU / cycles),
+        frequency_hz: coefficient("frequency_hz").filter(|_| law.form() == Form::Oscillation),
+        free_form: None,
+        modelled: true,
+        law: Some(laws.iter().map(|(law, _)| in_numbers(law)).collect::<Vec<_>>().join("; ")),
+        sentence: format!(
+            "No effect of the catalogue explains this, a law describes it. {}{rest}",
+            sentences.join(" ")
+        ),
+    })
+}
