@@ -9,8 +9,9 @@
 //! | wave | `a sin(n x + phase)`; over time `a sin(2 pi f t + phase)` |
 //! | bump | `a exp(-((x - at) / width)^2)` |
 //! | ramp | `a x` |
-//! | square | `a x^2` |
+//! | square | `a x^2`, or `a x abs(x)` |
 //! | decay | `a (1 - exp(-t / time_constant))` |
+//! | hysteresis | `-a z`, with `dz = (1 - z sign(dx)) dx / width`, `-1 <= z <= 1`: Dahl's |
 //!
 //! A new law is one entry of [`LAWS`]; a new form or port is one arm of [`Form::value`] or of a hook.
 
@@ -37,6 +38,8 @@ pub enum Port {
     InputRadius,
     /// Radius of the output pulley, relative: `r2 (1 + y)`.
     OutputRadius,
+    /// Length of both tendons, relative to what the pretension stretches them by; a longer tendon is less tight.
+    TendonLength,
     /// Torque on the joint, N·m; positive accelerates it.
     JointTorque,
     /// Friction of the joint, N·m; it opposes motion.
@@ -55,6 +58,7 @@ impl Port {
             Self::SheathFriction => "sheath_friction",
             Self::InputRadius => "input_radius",
             Self::OutputRadius => "output_radius",
+            Self::TendonLength => "tendon_length",
             Self::JointTorque => "joint_torque_nm",
             Self::JointFriction => "joint_friction_nm",
             Self::Reading => "reading",
@@ -70,6 +74,7 @@ impl Port {
             Self::SheathFriction => "friction coefficient of the sheaths, relative change",
             Self::InputRadius => "radius of the input pulley, relative change",
             Self::OutputRadius => "radius of the output pulley, relative change",
+            Self::TendonLength => "length of both tendons, over what the pretension stretches them by",
             Self::JointTorque => "torque on the joint",
             Self::JointFriction => "friction of the joint, against its motion",
             Self::Reading => "reading of the sensor, shown minus true",
@@ -84,6 +89,8 @@ pub enum Variable {
     InputAngle,
     /// Speed of the rotor, in input-pulley rad/s.
     InputSpeed,
+    /// Torque of the motor's current at the input pulley, N·m.
+    MotorTorque,
     /// Angle of the joint, rad.
     JointAngle,
     /// Speed of the joint, rad/s.
@@ -103,6 +110,7 @@ impl Variable {
         match self {
             Self::InputAngle => "theta_in_rad",
             Self::InputSpeed => "omega_in_rad_s",
+            Self::MotorTorque => "motor_torque_nm",
             Self::JointAngle => "theta_out_rad",
             Self::JointSpeed => "omega_out_rad_s",
             Self::RelativeTension => "relative_tension",
@@ -131,12 +139,18 @@ pub enum Form {
     Ramp,
     /// `a x^2`, parameter `a`.
     Square,
+    /// `a x abs(x)`, parameter `a`.
+    SignedSquare,
     /// `a (1 - exp(-x / time_constant))`, parameters `a`, `time_constant`.
     Decay,
+    /// `-a z` with `dz = (1 - z sign(dx)) dx / width`, parameters `a`, `width`; it remembers the way to `x`.
+    ///
+    /// Source: Dahl, AIAA J. 14 (1976) 1675, with exponent 1.
+    Hysteresis,
 }
 
 impl Form {
-    /// The formula at `x`.
+    /// The formula at `x`; 0 for one that remembers the way there, see [`Form::remembered`].
     #[must_use]
     pub fn value(self, p: &[f64; MAX_PARAMETERS], x: f64) -> f64 {
         match self {
@@ -151,8 +165,25 @@ impl Form {
             }
             Self::Ramp => p[0] * x,
             Self::Square => p[0] * x * x,
+            Self::SignedSquare => p[0] * x * x.abs(),
             Self::Decay => p[0] * (1.0 - exp(-x.max(0.0) / p[1])),
+            Self::Hysteresis => 0.0,
         }
+    }
+
+    /// The formula at `x`, which it has reached by the way that `memory` tells; the way begins where it is first asked.
+    #[must_use]
+    pub fn remembered(self, p: &[f64; MAX_PARAMETERS], memory: &mut EffectState, x: f64) -> f64 {
+        if self != Self::Hysteresis {
+            return self.value(p, x);
+        }
+        let [z, last, begun, ..] = memory;
+        let dx = if *begun == 0.0 { 0.0 } else { x - *last };
+        (*last, *begun) = (x, 1.0);
+        // Exact for any turn that goes one way: 1 - z sign(dx) falls by exp(-|dx| / width).
+        let way = dx.signum();
+        *z = way - (way - *z) * exp(-dx.abs() / p[1]);
+        -p[0] * *z
     }
 
     /// Integral of the formula from 0 to `x`, for the forms that a radius may have; 0 for the others.
@@ -175,8 +206,9 @@ impl Form {
             Self::Oscillation => "oscillates over",
             Self::Bump => "is confined to one place of",
             Self::Ramp => "grows in proportion to",
-            Self::Square => "grows with the square of",
+            Self::Square | Self::SignedSquare => "grows with the square of",
             Self::Decay => "sets in exponentially over",
+            Self::Hysteresis => "remembers the last reversal of",
         }
     }
 }
@@ -222,15 +254,14 @@ impl Effect for Law {
         self.descriptor
     }
 
-    fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
-        let y = self.form.value(
-            p,
-            match self.variable {
-                Variable::InputSpeed => port.omega_rad_s,
-                Variable::Time => port.t_s,
-                _ => port.theta_rad,
-            },
-        );
+    fn motor(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut MotorPort) {
+        let x = match self.variable {
+            Variable::InputSpeed => port.omega_rad_s,
+            Variable::MotorTorque => port.motor_torque_nm,
+            Variable::Time => port.t_s,
+            _ => port.theta_rad,
+        };
+        let y = self.form.remembered(p, state, x);
         match self.port {
             Port::MotorFriction => port.coulomb_nm = (port.coulomb_nm + y).max(0.0),
             _ => port.torque_nm += y,
@@ -244,6 +275,18 @@ impl Effect for Law {
                 let theta_rad = [port.theta_in_rad, port.theta_out_rad][end];
                 port.radius_excess[end] += self.form.value(p, theta_rad);
                 port.wound_excess_rad[end] += self.form.integral(p, theta_rad);
+            }
+            Port::TendonLength => {
+                let x = match self.variable {
+                    Variable::Time => port.t_s,
+                    Variable::JointAngle => port.theta_out_rad,
+                    _ => port.theta_in_rad,
+                };
+                let stretched_m = port.pretension_n / port.stiffness_n_per_m;
+                let longer_m = stretched_m * self.form.value(p, x);
+                for tendon in &mut port.tendons {
+                    tendon.added_length_m += longer_m;
+                }
             }
             _ => {
                 let pretension_n = port.pretension_n;
@@ -263,24 +306,22 @@ impl Effect for Law {
         }
     }
 
-    fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {
-        let y = self.form.value(
-            p,
-            match self.variable {
-                Variable::JointSpeed => port.omega_rad_s,
-                Variable::Time => port.t_s,
-                _ => port.theta_rad,
-            },
-        );
+    fn joint(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut JointPort) {
+        let x = match self.variable {
+            Variable::JointSpeed => port.omega_rad_s,
+            Variable::Time => port.t_s,
+            _ => port.theta_rad,
+        };
+        let y = self.form.remembered(p, state, x);
         match self.port {
             Port::JointFriction => port.coulomb_nm = (port.coulomb_nm + y).max(0.0),
             _ => port.torque_nm += y,
         }
     }
 
-    fn measure(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut SensorPort) {
+    fn measure(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut SensorPort) {
         let x = if self.variable == Variable::Time { port.t_s } else { port.value };
-        port.value += self.form.value(p, x);
+        port.value += self.form.remembered(p, state, x);
     }
 }
 
@@ -307,6 +348,7 @@ const SENSORS: &[Channel] = &[
 const ANGLES: &[Channel] = &[Channel::ThetaIn, Channel::ThetaOut];
 
 const EXPONENT: ParameterSpec = ParameterSpec::linear("exponent", "1", [0.2, 5.0], 2.0, "exponent");
+const ANY_EXPONENT: ParameterSpec = ParameterSpec::linear("exponent", "1", [-3.0, 5.0], 1.0, "exponent");
 const CYCLES: ParameterSpec =
     ParameterSpec::log("cycles_per_turn", "1", [0.3, 300.0], 4.0, "periods per turn");
 const FREQUENCY: ParameterSpec = ParameterSpec::log("frequency_hz", "Hz", [0.05, 500.0], 5.0, "frequency");
@@ -319,6 +361,8 @@ const TIME_CONSTANT: ParameterSpec =
 /// Size of a torque where a file does not say and where a search starts, in a joint of the paper's size.
 const TORQUE: ParameterSpec =
     ParameterSpec::linear("amplitude_nm", "N·m", [-100.0, 100.0], 0.05, "amplitude");
+const LOST: ParameterSpec =
+    ParameterSpec::linear("amplitude", "1/(N·m)", [-10.0, 10.0], -0.02, "amplitude at 1 N·m");
 /// The same of a friction at 1 rad/s, which does not drive.
 const DRAG: ParameterSpec =
     ParameterSpec::linear("amplitude_nm", "N·m", [0.0, 100.0], 0.05, "amplitude at 1 rad/s");
@@ -326,6 +370,8 @@ const STIFFENING: ParameterSpec =
     ParameterSpec::linear("amplitude_nm", "N·m", [-100.0, 100.0], 0.05, "amplitude at 1 rad");
 const RUB: ParameterSpec = ParameterSpec::linear("amplitude_nm", "N·m", [0.0, 100.0], 0.05, "amplitude");
 const RELATIVE: ParameterSpec = ParameterSpec::linear("amplitude", "1", [-5.0, 5.0], 0.2, "amplitude");
+const TIGHTENING: ParameterSpec =
+    ParameterSpec::linear("curvature", "1/rad^2", [-20.0, 20.0], -0.5, "curvature");
 const RELATIVE_RADIUS: ParameterSpec =
     ParameterSpec::linear("amplitude", "1", [-0.4, 0.4], 0.03, "amplitude");
 const PER_RADIAN: ParameterSpec = ParameterSpec::linear("slope_per_rad", "1/rad", [-0.4, 0.4], 0.02, "slope");
@@ -333,13 +379,21 @@ const SHOWN: ParameterSpec =
     ParameterSpec::linear("amplitude", "unit of the channel", [-1e4, 1e4], 0.2, "amplitude");
 const SHOWN_RAD: ParameterSpec =
     ParameterSpec::linear("amplitude_rad", "rad", [-0.3, 0.3], 0.01, "amplitude");
+const LAG_OF_SENSOR: ParameterSpec =
+    ParameterSpec::linear("amplitude", "unit of the channel", [0.0, 1e4], 1.0, "half width of the loop");
+const BRANCH: ParameterSpec =
+    ParameterSpec::log("width", "unit of the channel", [1e-3, 1e4], 5.0, "travel of a branch");
+const BRANCH_RAD: ParameterSpec =
+    ParameterSpec::log("width_rad", "rad", [0.002, 5.0], 0.1, "turn of a branch");
 const CURVATURE: ParameterSpec =
     ParameterSpec::linear("curvature", "1/unit of the channel", [-10.0, 10.0], 0.002, "curvature");
 
 const fn component_of(port: Port) -> Component {
     match port {
         Port::MotorTorque | Port::MotorFriction => Component::Motor,
-        Port::SheathFriction | Port::InputRadius | Port::OutputRadius => Component::Transmission,
+        Port::SheathFriction | Port::InputRadius | Port::OutputRadius | Port::TendonLength => {
+            Component::Transmission
+        }
         Port::JointTorque | Port::JointFriction => Component::Joint,
         Port::Reading => Component::Sensors,
     }
@@ -348,7 +402,7 @@ const fn component_of(port: Port) -> Component {
 const fn channels_of(port: Port, form: Form) -> &'static [Channel] {
     match (port, form) {
         (Port::Reading, Form::Wave) => ANGLES,
-        (Port::Reading, Form::Square) => TENSIONS_AND_CURRENT,
+        (Port::Reading, Form::Square | Form::Hysteresis) => TENSIONS_AND_CURRENT,
         (Port::Reading, _) => SENSORS,
         _ => &[],
     }
@@ -374,7 +428,7 @@ macro_rules! law {
 }
 
 /// All laws, input to output.
-pub static LAWS: [Law; 23] = [
+pub static LAWS: [Law; 30] = [
     law!(
         "law_motor_friction_by_speed",
         MotorFriction,
@@ -398,6 +452,30 @@ pub static LAWS: [Law; 23] = [
         Bump,
         "amplitude_nm * exp(-((theta_in_rad - at_rad) / width_rad)^2)",
         [TORQUE, AT, WIDTH]
+    ),
+    law!(
+        "law_motor_torque_by_angle",
+        MotorTorque,
+        InputAngle,
+        Power,
+        "amplitude_nm * sign(theta_in_rad) * abs(theta_in_rad)^exponent",
+        [STIFFENING, EXPONENT]
+    ),
+    law!(
+        "law_motor_torque_is_curved",
+        MotorTorque,
+        MotorTorque,
+        SignedSquare,
+        "amplitude * motor_torque_nm * abs(motor_torque_nm)",
+        [LOST]
+    ),
+    law!(
+        "law_motor_torque_hysteresis",
+        MotorTorque,
+        InputAngle,
+        Hysteresis,
+        "-amplitude_nm * dahl(theta_in_rad / width_rad)",
+        [RUB, BRANCH_RAD]
     ),
     law!(
         "law_motor_torque_over_time",
@@ -429,7 +507,7 @@ pub static LAWS: [Law; 23] = [
         RelativeTension,
         PowerFromOne,
         "amplitude * (abs(relative_tension)^exponent - 1)",
-        [RELATIVE, EXPONENT]
+        [RELATIVE, ANY_EXPONENT]
     ),
     law!(
         "law_sheath_friction_sets_in",
@@ -480,6 +558,22 @@ pub static LAWS: [Law; 23] = [
         [PER_RADIAN]
     ),
     law!(
+        "law_tendon_length_by_joint_angle",
+        TendonLength,
+        JointAngle,
+        Square,
+        "curvature * theta_out_rad^2",
+        [TIGHTENING]
+    ),
+    law!(
+        "law_tendon_length_over_time",
+        TendonLength,
+        Time,
+        Oscillation,
+        "amplitude * sin(2 * pi * frequency_hz * t_s + phase_rad)",
+        [RELATIVE, FREQUENCY, PHASE]
+    ),
+    law!(
         "law_joint_friction_by_speed",
         JointFriction,
         JointSpeed,
@@ -520,6 +614,14 @@ pub static LAWS: [Law; 23] = [
         [STIFFENING, EXPONENT]
     ),
     law!(
+        "law_joint_torque_hysteresis",
+        JointTorque,
+        JointAngle,
+        Hysteresis,
+        "-amplitude_nm * dahl(theta_out_rad / width_rad)",
+        [RUB, BRANCH_RAD]
+    ),
+    law!(
         "law_joint_torque_over_time",
         JointTorque,
         Time,
@@ -550,6 +652,14 @@ pub static LAWS: [Law; 23] = [
         Wave,
         "amplitude_rad * sin(cycles_per_turn * value + phase_rad)",
         [SHOWN_RAD, CYCLES, PHASE]
+    ),
+    law!(
+        "law_reading_hysteresis",
+        Reading,
+        Value,
+        Hysteresis,
+        "-amplitude * dahl(value / width)",
+        [LAG_OF_SENSOR, BRANCH]
     ),
     law!("law_reading_is_curved", Reading, Value, Square, "curvature * value^2", [CURVATURE]),
 ];

@@ -27,11 +27,35 @@ fn forms_have_the_values_of_their_formulas() {
         (Form::Bump, &[2.0, 0.3, 0.1], 0.4, 2.0 * 0.367_879_441_171_442),
         (Form::Ramp, &[2.0], -0.5, -1.0),
         (Form::Square, &[2.0], -0.5, 0.5),
+        (Form::SignedSquare, &[2.0], -0.5, -0.5),
         (Form::Decay, &[2.0, 4.0], 4.0, 2.0 * 0.632_120_558_828_558),
         (Form::Decay, &[2.0, 4.0], -1.0, 0.0),
     ] {
         let found = form.value(&coefficients(p), x);
         assert!((found - want).abs() < 1e-12, "{form:?} at {x}: {found}, expected {want}");
+    }
+}
+
+/// From rest the branch is `-a (1 - exp(-x / width))`; after a reversal at the end of a long way it falls from `-a` towards `a`,
+/// by `2 a (1 - exp(-x / width))`. A step may be as long as it likes.
+#[test]
+fn a_loop_remembers_its_last_reversal() {
+    let p = coefficients(&[2.0, 0.1]);
+    for steps in [1, 7] {
+        let mut memory = [0.0; bowden_model::effect::MAX_STATE];
+        let mut goes = |from: f64, to: f64| {
+            (1..=steps)
+                .map(|k| {
+                    let x = from + (to - from) * f64::from(k) / f64::from(steps);
+                    Form::Hysteresis.remembered(&p, &mut memory, x)
+                })
+                .last()
+                .unwrap()
+        };
+        goes(0.3, 0.3);
+        assert!((goes(0.3, 0.4) + 2.0 * 0.632_120_558_828_558).abs() < 1e-12);
+        assert!((goes(0.4, 5.0) + 2.0).abs() < 1e-12);
+        assert!((goes(5.0, 4.9) - (-2.0 + 4.0 * 0.632_120_558_828_558)).abs() < 1e-12);
     }
 }
 

@@ -11,6 +11,7 @@ mod afterwards;
 mod candidates;
 mod constancy;
 mod experiment;
+mod hum;
 mod law_candidates;
 mod layout;
 mod locked;
@@ -30,6 +31,7 @@ use std::collections::BTreeMap;
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
+use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::law;
 
 use crate::fit::objective::{Objective, Part, Series};
@@ -44,6 +46,7 @@ use crate::study::{Role, Study};
 use afterwards::afterwards;
 use experiment::{Bearable, Shown};
 pub use experiment::{Experiment, SECONDS as EXPERIMENT_S};
+use hum::Hum;
 use layout::Layout;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use stages::{Stage, Stages};
@@ -202,9 +205,11 @@ impl Case<'_> {
             Some(inconstant) => Some(inconstant),
             None => unexplained::unexplained(objective, &selected.searched)?,
         };
+        let hums = if selected.complete { self.add_hums(&mut last.model)? } else { Vec::new() };
         let stages = Stages { before, recalibrated, after: Stage::of(objective, &last.model)? };
         let traces = stages::traces(objective, model, &last.model)?;
-        Ok(self.report(&selected, &last, &stages, unexplained, traces))
+        let left = Left { hums, unexplained };
+        Ok(self.report(&selected, &last, &stages, left, traces))
     }
 }
 
@@ -219,6 +224,12 @@ fn search_elements(model: &JointModel) -> usize {
         model.parameters.sheath.map_or(0.0, |sheath| sheath.friction_coefficient * sheath.wrap_angle_rad);
     let enough = (wrap_friction / (12.0 * SEARCH_ERROR).sqrt()).ceil() as usize;
     enough.clamp(*SEARCH_ELEMENTS.start(), *SEARCH_ELEMENTS.end())
+}
+
+/// What has no name.
+struct Left {
+    hums: Vec<Hum>,
+    unexplained: Option<Unexplained>,
 }
 
 /// What a diagnosis is about.
@@ -265,6 +276,14 @@ impl Case<'_> {
         BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted }
     }
 
+    /// Adds the hum of sensors that `model` leaves.
+    fn add_hums(&self, model: &mut JointModel) -> Result<Vec<Hum>, Failure> {
+        let mut found = hum::hums(self.objective, &self.objective.predict(model)?);
+        found.truncate(MAX_ACTIVE.saturating_sub(model.effects.len()));
+        model.effects.extend(found.iter().map(|hum| hum.law));
+        Ok(found)
+    }
+
     /// Whether the joint has tendons of which no recording holds a tension.
     ///
     /// Then little more than the product of friction and pretension is seen. Fitted without what is ordinary, the two run off
@@ -283,7 +302,7 @@ impl Case<'_> {
         selected: &Selected,
         last: &Solution,
         stages: &Stages,
-        unexplained: Option<Unexplained>,
+        Left { hums, unexplained }: Left,
         traces: Vec<Trace>,
     ) -> Diagnosed {
         let Self { rig, objective, model, .. } = *self;
@@ -317,7 +336,8 @@ impl Case<'_> {
             let values = first_value..first_value + count;
             first_value += Layout::of_found(&last.model, own + index).len();
             if let Some(law) = law::of(&active) {
-                laws.push((stated_laws::stated(law, &active, chosen, &last.stds[values]), active));
+                let losses = [chosen.loss_before, chosen.loss_after];
+                laws.push((stated_laws::stated(law, &active, losses, &last.stds[values]), active));
                 continue;
             }
             let separate = |tried: &Tried| {
@@ -328,6 +348,7 @@ impl Case<'_> {
             };
             effects.push(named(active, chosen, &last.stds[values], objective, separate));
         }
+        laws.extend(hums.iter().filter_map(|hum| Some((hum.stated()?, hum.law))));
         let mismatch = place::mismatch(objective, &stages.recalibrated.residuals);
         let unexplained = stated_laws::unexplained(&laws, unexplained, &mismatch);
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));

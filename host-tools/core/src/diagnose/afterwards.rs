@@ -1,6 +1,12 @@
 //! The bench after its recordings: what happened at a moment has happened, what has passed is gone, and creep and drift go
 //! on from where they are.
 
+use std::f64::consts::TAU;
+
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effects;
+use bowden_model::law::{self, Form};
+
 use crate::joint_model::JointModel;
 
 /// `model` after `clock_s` seconds of recordings. The first `own` effects are the rig's and stay as it states them.
@@ -16,6 +22,28 @@ pub(super) fn afterwards(model: &JointModel, own: usize, clock_s: f64) -> JointM
                     sheath.friction_coefficient *= drifted;
                 }
                 now.effects.push(effect.with("rate_per_s", effect.parameters[0] / drifted.max(1e-3)));
+            }
+            "law_sheath_friction_sets_in" => {
+                let [amplitude, time_constant_s, ..] = effect.parameters;
+                let to_come = amplitude * (-clock_s / time_constant_s).exp();
+                let factor = (1.0 + amplitude - to_come).max(0.0);
+                if let Some(sheath) = &mut now.parameters.sheath {
+                    sheath.friction_coefficient *= factor;
+                }
+                now.effects.push(effect.with("amplitude", to_come / factor.max(1e-3)));
+            }
+            "law_reading_sets_in" => {
+                let [amplitude, time_constant_s, ..] = effect.parameters;
+                let to_come = amplitude * (-clock_s / time_constant_s).exp();
+                let offset = effects::find("sensor_offset").map(ActiveEffect::with_defaults);
+                let offset = offset.map(|offset| offset.with("offset", amplitude - to_come));
+                now.effects.extend(offset.map(|offset| ActiveEffect { target: effect.target, ..offset }));
+                now.effects.push(effect.with("amplitude", to_come));
+            }
+            _ if law::of(&effect).is_some_and(|law| law.form() == Form::Oscillation) => {
+                let [_, frequency_hz, phase_rad, ..] = effect.parameters;
+                let phase_rad = phase_rad + TAU * frequency_hz * clock_s;
+                now.effects.push(effect.with("phase_rad", phase_rad - TAU * (phase_rad / TAU).round()));
             }
             "tendon_creep" => now.effects.push(effect.with("age_s", effect.parameters[2] + clock_s)),
             _ => now.effects.push(effect.with("time_s", 0.0)),
@@ -53,6 +81,35 @@ mod tests {
         assert!((friction - 0.096).abs() < 1e-12, "{friction}");
         let rate = now.effects[0].parameters[0];
         assert!((rate * friction - -0.01 * 0.12).abs() < 1e-12, "{rate}");
+    }
+
+    /// Friction that falls to half its value with a time constant of 10 s has, after as long, 1 - 0.5 (1 - 1/e) of it.
+    #[test]
+    fn what_has_set_in_does_not_begin_anew() {
+        let law = bowden_model::law::find("law_sheath_friction_sets_in").unwrap();
+        let active = ActiveEffect::with_defaults(law).with("amplitude", -0.5).with("time_constant_s", 10.0);
+        let now = after(10.0, &[active]);
+        let friction = now.parameters.sheath.unwrap().friction_coefficient;
+        assert!((friction / 0.12 - 0.683_939_7).abs() < 1e-6, "{friction}");
+        // At last it is half of what it was.
+        assert!((friction * (1.0 + now.effects[0].parameters[0]) - 0.06).abs() < 1e-12);
+    }
+
+    /// A reading that warms up keeps what it has drifted as an offset; a swing goes on where it is: a quarter of a second at 7 Hz is
+    /// a turn and three quarters.
+    #[test]
+    fn a_sensor_goes_on_from_where_it_is() {
+        let law = |id| ActiveEffect::with_defaults(bowden_model::law::find(id).unwrap());
+        let warm = law("law_reading_sets_in").with("amplitude", 2.0).with("time_constant_s", 10.0);
+        let now = after(10.0, &[warm]).effects;
+        let [offset, rest] = &now[..] else { panic!("{now:?}") };
+        assert_eq!((offset.descriptor().id, offset.target), ("sensor_offset", warm.target));
+        assert!((offset.parameters[0] - 1.264_241_1).abs() < 1e-6, "{offset:?}");
+        assert!((rest.parameters[0] - 0.735_758_9).abs() < 1e-6, "{rest:?}");
+        let swing = law("law_reading_over_time").with("frequency_hz", 7.0).with("phase_rad", 1.0);
+        let now = after(0.25, &[swing]).effects;
+        let turned = std::f64::consts::FRAC_PI_2;
+        assert!((now[0].parameters[2] - (1.0 - turned)).abs() < 1e-9, "{now:?}");
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Laws that the parts of a joint can have, and where to start: places and periods are read off what is left.
 
 use bowden_model::channel::Channel;
+use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::{ActiveEffect, Effect, Target};
-use bowden_model::law::{self, Form, LAWS, Law, Variable};
+use bowden_model::law::{self, Form, LAWS, Law, Port, Variable};
+use bowden_model::parameters::MotorParameters;
 
 use super::candidates::{Candidate, fits, overlaps, targets};
 use super::unexplained::samples::{Samples, Variable as Seen};
@@ -15,6 +17,9 @@ use crate::simulation::Prediction;
 /// Exponents at which a power of speed or angle is tried.
 const EXPONENTS: [f64; 3] = [0.5, 2.0, 3.0];
 
+/// Exponents at which a change with the tension is tried.
+const EXPONENTS_FROM_ONE: [f64; 3] = [-0.7, 0.7, 2.0];
+
 /// Places along the travel among which those are sought at which most is left, and how many of them a bump is tried at.
 const PLACES: usize = 9;
 const PLACES_TRIED: usize = 3;
@@ -22,8 +27,14 @@ const PLACES_TRIED: usize = 3;
 /// Half width of such a bump, as a part of the travel.
 const WIDTH: f64 = 0.08;
 
+/// Turns of a branch at which a loop of hysteresis is tried, as parts of the travel.
+const BRANCHES: [f64; 2] = [0.03, 0.15];
+
+/// Torque that is missing at the motor's stall, as a part of it, at which a saturating motor is tried.
+const MISSING_AT_STALL: f64 = 1.0;
+
 /// Time constants at which something that sets in is tried, as parts of the recordings' length.
-const SETTING_IN: [f64; 2] = [0.05, 0.3];
+const SETTING_IN: [f64; 3] = [0.05, 0.13, 0.35];
 
 /// Phases of a wave; the others are these with the other sign.
 const PHASES_RAD: [f64; 2] = [0.0, std::f64::consts::FRAC_PI_2];
@@ -31,6 +42,7 @@ const PHASES_RAD: [f64; 2] = [0.0, std::f64::consts::FRAC_PI_2];
 /// What is known of the motion and of what is left, for all laws.
 struct Ground<'a> {
     objective: &'a Objective,
+    motor: Option<MotorParameters>,
     samples: Samples,
     input_rates: Vec<f64>,
     joint_rates: Vec<f64>,
@@ -48,6 +60,7 @@ pub(super) fn law_candidates(
     let samples = Samples::new(objective, predictions);
     let ground = Ground {
         objective,
+        motor: model.parameters.motor,
         input_rates: rates_along(&samples, Seen::ThetaIn),
         joint_rates: rates_along(&samples, Seen::ThetaOut),
         frequencies_hz: frequencies_hz(&samples, None),
@@ -80,14 +93,25 @@ impl Ground<'_> {
     fn starts(&self, law: &Law, base: ActiveEffect) -> Vec<ActiveEffect> {
         match law.form() {
             Form::Ramp | Form::Square => vec![base],
-            Form::PowerFromOne => vec![base.with("exponent", 1.0)],
+            Form::SignedSquare => {
+                let stall_nm = self.motor.as_ref().map(pulley_stall_torque_nm);
+                stall_nm
+                    .map(|stall_nm| base.with("amplitude", -MISSING_AT_STALL / stall_nm))
+                    .into_iter()
+                    .collect()
+            }
+            Form::Hysteresis => self.loops(law, base),
+            Form::PowerFromOne => EXPONENTS_FROM_ONE.map(|exponent| base.with("exponent", exponent)).to_vec(),
             Form::Power | Form::EvenPower => {
                 let usual = self.usual(law.variable());
                 let size = base.parameters[0];
                 let start = |exponent: &f64| {
                     base.with("exponent", *exponent).with("amplitude_nm", size / usual.powf(*exponent))
                 };
-                if usual > 0.0 { EXPONENTS.iter().map(start).collect() } else { Vec::new() }
+                // Behind the input pulley a spring has a name, before it none.
+                let least = if law.port() == Port::MotorTorque { Some(&1.0) } else { None };
+                let exponents = least.into_iter().chain(&EXPONENTS);
+                if usual > 0.0 { exponents.map(start).collect() } else { Vec::new() }
             }
             Form::Wave => {
                 let rates = match law.variable() {
@@ -112,9 +136,29 @@ impl Ground<'_> {
             }
             Form::Decay => {
                 let duration_s = self.objective.duration_s();
-                SETTING_IN.map(|part| base.with("time_constant_s", part * duration_s)).to_vec()
+                let starting = |part: f64| base.with("time_constant_s", part * duration_s);
+                // A law that takes a good part of friction away is not the mirror of one that adds it.
+                let rise = base.parameters[0];
+                let either =
+                    |part| [rise, -rise].map(|amplitude| starting(part).with("amplitude", amplitude));
+                SETTING_IN.into_iter().flat_map(either).collect()
             }
         }
+    }
+
+    /// A loop over the angle of a part, or over what a sensor shows.
+    fn loops(&self, law: &Law, base: ActiveEffect) -> Vec<ActiveEffect> {
+        let travel = match base.target {
+            Target::One(channel) => range(
+                (0..self.objective.recordings())
+                    .filter_map(|recording| self.objective.measured(recording, Series::Channel(channel)))
+                    .flatten(),
+            ),
+            _ => self.travel(law.variable()),
+        };
+        let Some((low, high)) = travel.filter(|(low, high)| high > low) else { return Vec::new() };
+        let name = base.descriptor().parameters[1].name;
+        BRANCHES.map(|part| base.with(name, part * (high - low))).to_vec()
     }
 
     /// Angle that a law depends on, or whose speed it depends on, as measured over all recordings.
@@ -131,9 +175,7 @@ impl Ground<'_> {
     fn travel(&self, variable: Variable) -> Option<(f64, f64)> {
         /// Least travel with places to tell apart, rad.
         const LEAST_RAD: f64 = 0.05;
-        let angle = self.angle(variable)?.iter();
-        let (low, high) = angle.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-        (high - low > LEAST_RAD).then_some((low, high))
+        range(self.angle(variable)?.iter()).filter(|(low, high)| high - low > LEAST_RAD)
     }
 
     /// Middles of the parts of the travel from `low` to `high` in which the mean square of what is left of all series is largest.
@@ -164,6 +206,14 @@ impl Ground<'_> {
         let values = values.unwrap_or_default();
         (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
     }
+}
+
+/// Smallest and largest of some values; `None` without any.
+fn range<'a>(values: impl Iterator<Item = &'a f64>) -> Option<(f64, f64)> {
+    values.fold(None, |ends, x| {
+        let (low, high) = ends.unwrap_or((*x, *x));
+        Some((low.min(*x), high.max(*x)))
+    })
 }
 
 /// At every rate, both phases.

@@ -2,6 +2,7 @@
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 
 mod laws;
+mod trying;
 
 use std::cmp::Ordering;
 
@@ -9,14 +10,10 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::law;
 use rayon::prelude::*;
 
-use super::candidates::candidates;
-use super::law_candidates::law_candidates;
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
-use super::onset::between_recordings;
-use super::screening::{Present, Screened, screen};
 use crate::fit::objective::{Objective, Part};
-use crate::fit::solver::{COARSE_STEP, FINE_STEP, Known, Solution, solve_for_ranking, solve_in_rounds};
+use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::typical::typical;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
@@ -47,18 +44,8 @@ const NAMED_STRENGTH: f64 = 0.1;
 /// 0.8 to 3.5 mm/s came out; on the fifty that hide nothing, at most 0.09 mm/s, at speeds of 0.1 to 1.4 mm/s.
 const LEAST_FALL_M_S: f64 = 2.5e-4;
 
-/// Candidates that are fitted, of those that screening ranks first.
-const FITTED: usize = 7;
-
 /// Candidates whose fit is brought to an end, of those that fit best so far.
 const FINALISTS: usize = 3;
-
-/// Held-out loss, over that of the best, beyond which a candidate is no finalist.
-const BEHIND: f64 = 2.5;
-
-/// Part of its estimated gain that a candidate's fit with the slopes of the present model has to reach; one that does not is fitted
-/// with slopes of its own.
-const KEPT_PROMISE: f64 = 0.5;
 
 /// Estimated gain below which a candidate is not fitted.
 const PROMISING: f64 = 0.08;
@@ -163,19 +150,12 @@ pub fn select(
 ) -> Result<Selected, Failure> {
     let search = Search { objective, believed: model, asked, progress };
     let (baseline, mut present) = search.baseline()?;
-    let plain = present.solution.model.clone();
+    let nothing = present.clone();
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut rounds = Vec::new();
-    while chosen.len() < MOST_EFFECTS && !progress.interrupted() {
-        let before = search.without_exhausted(&present)?;
-        let (record, fits) = search.one_more(&before, Kind::Name)?;
-        rounds.push(Round { loss_before: before.loss, candidates: record });
-        let Some((found, with)) = search.found(&before, &present, fits, worthwhile)? else { break };
-        chosen.push(found);
-        present = with;
-    }
-    if !progress.interrupted() {
-        search.prune(&mut present, &mut chosen)?;
+    search.add_names(&mut present, &mut chosen, &mut rounds)?;
+    if search.law_in_place_of_names(&nothing, &mut present, &mut chosen, &mut rounds)? {
+        search.add_names(&mut present, &mut chosen, &mut rounds)?;
     }
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
     let model = present.without_ordinary();
@@ -183,7 +163,7 @@ pub fn select(
     let ordinary = present.layout.ordinary(&searched).to_vec();
     Ok(Selected {
         baseline,
-        plain,
+        plain: nothing.solution.model,
         searched,
         ordinary,
         model,
@@ -286,6 +266,24 @@ impl Search<'_> {
         Ok((baseline, self.with_ordinary(plain)?))
     }
 
+    /// Adds name after name while one is worth it, and takes out those that later ones have made superfluous.
+    fn add_names(
+        &self,
+        present: &mut Fitted,
+        chosen: &mut Vec<Chosen>,
+        rounds: &mut Vec<Round>,
+    ) -> Result<(), Failure> {
+        while chosen.len() < MOST_EFFECTS && !self.progress.interrupted() {
+            let before = self.without_exhausted(present)?;
+            let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
+            rounds.push(Round { loss_before: before.loss, candidates: record });
+            let Some((found, with)) = self.found(&before, present, fits, worthwhile)? else { break };
+            chosen.push(found);
+            *present = with;
+        }
+        if self.progress.interrupted() { Ok(()) } else { self.prune(present, chosen) }
+    }
+
     /// `present`, fitted without the ordinary effects that are as large as they may be.
     fn without_exhausted(&self, present: &Fitted) -> Result<Fitted, Failure> {
         match present.layout.without_exhausted(self.believed, &present.solution.model) {
@@ -352,73 +350,6 @@ impl Search<'_> {
         Ok(Some((Chosen { effect, model, loss_before, loss_after, others }, with_ordinary)))
     }
 
-    /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
-    /// fitted to the end. Returns all candidates for the record, and the fits, best first.
-    fn one_more(&self, present: &Fitted, kind: Kind) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
-        let Self { objective, progress, .. } = *self;
-        let ranked = {
-            let predictions = objective.predict(&present.solution.model)?;
-            let model = present.without_ordinary();
-            let all = match kind {
-                Kind::Name => candidates(&model, objective, &predictions, self.asked),
-                Kind::Law => law_candidates(&model, objective, &predictions),
-            };
-            progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
-            let Fitted { layout, solution, .. } = present;
-            let present = Present { believed: self.believed, solution, layout, predictions: &predictions };
-            screen(objective, &present, &all, progress)
-        };
-        let promising = ranked.iter().filter(|s| s.gain > PROMISING).take(FITTED).count();
-        let mut record: Vec<Attempted> = ranked
-            .iter()
-            .map(|s| Attempted { effect: s.start, promised: s.gain, heldout_loss: None })
-            .collect();
-        progress.stage("fitting effects", promising as u64);
-        let mut fits = self.fit_promising(present, &ranked[..promising])?;
-        let best_first = |fits: &mut Vec<(usize, Fitted)>| {
-            fits.retain(|(_, fitted)| {
-                !fitted.unseen && !negligible(objective, self.believed, &fitted.newest())
-            });
-            fits.sort_by(|(_, a), (_, b)| a.best_first(b));
-        };
-        let mut keep = |place: usize, fitted: &Fitted| {
-            record[place].effect = fitted.newest();
-            record[place].heldout_loss = Some(fitted.loss);
-        };
-        for (place, fitted) in &fits {
-            keep(*place, fitted);
-        }
-        best_first(&mut fits);
-        let farthest = fits.first().map_or(0.0, |(_, best)| BEHIND * best.loss);
-        let ahead = fits.iter().take(FINALISTS).take_while(|(_, fitted)| fitted.loss <= farthest).count();
-        fits[..ahead].par_iter_mut().try_for_each(|(_, fitted)| {
-            if !progress.interrupted() {
-                *fitted = self.finish(fitted)?;
-            }
-            Ok::<(), Failure>(())
-        })?;
-        for (place, fitted) in &fits[..ahead] {
-            keep(*place, fitted);
-        }
-        best_first(&mut fits);
-        // Finished fits may have fallen behind one that only ranks; what is chosen is fitted to the end.
-        while let Some((place, first)) = fits.first_mut().filter(|(_, first)| !first.finished)
-            && !progress.interrupted()
-        {
-            *first = self.finish(first)?;
-            keep(*place, first);
-            best_first(&mut fits);
-        }
-        Ok((record, fits.into_iter().map(|(_, fitted)| fitted).collect()))
-    }
-
-    fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
-        let finished = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])?;
-        let model = &finished.solution.model;
-        let unseen = between_recordings(self.objective, model, model.effects.len() - 1)?;
-        Ok(Fitted { unseen, ..finished })
-    }
-
     /// Removes effects that the later ones have made superfluous.
     fn prune(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
         if chosen.len() < 2 {
@@ -441,52 +372,6 @@ impl Search<'_> {
             }
         }
         Ok(())
-    }
-
-    /// `present` with each of the candidates, by their places, fitted only as far as a ranking needs.
-    fn fit_promising(&self, present: &Fitted, ranked: &[Screened]) -> Result<Vec<(usize, Fitted)>, Failure> {
-        let Self { objective, progress, .. } = *self;
-        // One fit by itself leaves threads idle between its rounds of slopes.
-        let fits: Result<Vec<Option<(usize, Fitted)>>, Failure> = ranked
-            .par_iter()
-            .enumerate()
-            .map(|(place, screened)| {
-                let fitted =
-                    (!progress.interrupted()).then(|| self.fit_new(present, screened, true)).transpose();
-                progress.advance(1);
-                Ok(fitted?.map(|fitted| (place, fitted)))
-            })
-            .collect();
-        let mut fits: Vec<(usize, Fitted)> = fits?.into_iter().flatten().collect();
-        // The slopes of the present model may have led astray: stick and slip bend the way. Where what was promised would still
-        // be the best, slopes of its own show the way.
-        let training = |fitted: &Fitted| objective.mean_loss(&fitted.solution.residuals, Part::Training);
-        let before = training(present);
-        let best = fits.iter().map(|(_, fitted)| training(fitted)).fold(f64::INFINITY, f64::min);
-        fits.par_iter_mut().try_for_each(|(place, fitted)| {
-            let screened = &ranked[*place];
-            let astray = training(fitted) > (1.0 - KEPT_PROMISE * screened.gain) * before;
-            if astray && (1.0 - screened.gain) * before < best && !progress.interrupted() {
-                let own = self.fit_new(present, screened, false)?;
-                if training(&own) < training(fitted) {
-                    *fitted = own;
-                }
-            }
-            Ok::<(), Failure>(())
-        })?;
-        Ok(fits)
-    }
-
-    /// `present` with one more effect, fitted only as far as a ranking needs, with the slopes of `present` or slopes of its own.
-    fn fit_new(&self, present: &Fitted, screened: &Screened, known_slopes: bool) -> Result<Fitted, Failure> {
-        let without = screened.room.as_ref().unwrap_or(&present.solution.model);
-        let (layout, with) = present.layout.with(without, screened.start);
-        let free = layout.free(self.believed, &with);
-        let gone = present.layout.parameters_missing_in(&layout, self.believed);
-        let slopes = present.solution.jacobian.clone().remove_columns_at(&gone);
-        let known = Known { jacobian: known_slopes.then_some(&slopes), spread: present.solution.spread };
-        let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
-        Ok(self.judged(layout, solution, false))
     }
 
     /// Fits the nominal parameters and those of all effects that the rig itself did not state.
@@ -543,119 +428,4 @@ fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffec
 }
 
 #[cfg(test)]
-mod tests {
-    use bowden_model::effect::ActiveEffect;
-    use bowden_model::effects::find;
-    use nalgebra::DMatrix;
-
-    use super::{Losses, Selected, largest_ordinary, negligible, worthwhile};
-    use crate::fit::objective::{Objective, Residuals};
-    use crate::fit::solver::Solution;
-    use crate::joint_model::JointModel;
-    use crate::test_bench;
-
-    #[test]
-    fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig() {
-        let bench = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
-        let effect = |id| ActiveEffect::with_defaults(find(id).unwrap());
-        let with = |effects: &[ActiveEffect]| JointModel { effects: effects.to_vec(), ..bench.clone() };
-        let (before, after) = (effect("motor_coulomb_friction"), effect("presliding_compliance"));
-        let found = effect("joint_spring");
-        let selected = Selected {
-            baseline: Solution {
-                model: bench.clone(),
-                values: Vec::new(),
-                stds: Vec::new(),
-                residuals: Residuals { values: Vec::new() },
-                spread: 1.0,
-                jacobian: DMatrix::zeros(0, 0),
-            },
-            plain: with(&[before]),
-            searched: with(&[after, found]),
-            ordinary: vec![after],
-            model: with(&[found]),
-            chosen: Vec::new(),
-            rounds: Vec::new(),
-            complete: true,
-        };
-        let withdrawn = selected.withdrawn();
-        assert_eq!(withdrawn.ordinary, [before]);
-        assert_eq!((withdrawn.model, withdrawn.searched), (bench.clone(), with(&[before])));
-    }
-
-    /// The largest of the benches that hide nothing, the smallest of those whose sheaths stick; much friction that falls at
-    /// a crawl and a trace of it that falls late are neither.
-    #[test]
-    fn friction_that_falls_at_a_crawl_is_how_contacts_give_way() {
-        let recording = test_bench::swung(2000);
-        let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
-        for (static_ratio, speed_m_s, left_out) in [
-            (1.563, 0.000_16, true),
-            (1.053, 0.001_42, true),
-            (1.656, 0.001_18, false),
-            (1.543, 0.005_15, false),
-            (1.05, 0.02, true),
-        ] {
-            let effect = ActiveEffect::with_defaults(find("sheath_stribeck_friction").unwrap())
-                .with("static_ratio", static_ratio)
-                .with("speed_m_s", speed_m_s);
-            assert_eq!(
-                negligible(&objective, &bench, &effect),
-                left_out,
-                "{static_ratio} at {speed_m_s} m/s"
-            );
-        }
-    }
-
-    #[test]
-    fn what_every_bench_has_and_what_the_travel_does_not_show_has_no_name() {
-        let recording = test_bench::swung(2000);
-        let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
-        let friction = |share: f64| {
-            let largest_nm = largest_ordinary(&bench, "motor_coulomb_friction").unwrap();
-            ActiveEffect::with_defaults(find("motor_coulomb_friction").unwrap())
-                .with("torque_nm", share * largest_nm)
-        };
-        let cogging = |cycles_per_turn| {
-            ActiveEffect::with_defaults(find("motor_cogging").unwrap())
-                .with("cycles_per_turn", cycles_per_turn)
-        };
-        for (effect, left_out) in
-            [(friction(0.99), true), (friction(1.5), false), (cogging(11.0), true), (cogging(13.0), false)]
-        {
-            assert_eq!(negligible(&objective, &bench, &effect), left_out, "{:?}", effect.parameters);
-        }
-    }
-
-    /// A fifth of what is left is worth a name up to ten squared scales; of a hundred it takes more than 22 %.
-    #[test]
-    fn where_much_is_left_an_effect_has_to_take_more_off() {
-        for (before, after, named) in
-            [(10.0, 8.0, true), (12.5, 10.0, true), (125.0, 100.0, false), (145.0, 100.0, true)]
-        {
-            assert_eq!(worthwhile(before, after), named, "{before} to {after}");
-        }
-    }
-
-    #[test]
-    fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
-        for (losses, found) in [
-            // Nothing was left out.
-            ([1.0, 0.8, 1.0, 0.8], true),
-            ([1.0, 0.9, 1.0, 0.9], false),
-            // Dry friction beyond the ordinary: it takes the place of that.
-            ([1.2, 0.6, 0.7, 0.6], true),
-            // Viscous friction beside dry friction, neither of which does alone.
-            ([1.03, 0.71, 0.67, 0.48], true),
-            // What imitates the ordinary, does no better and adds nothing.
-            ([1.03, 0.71, 0.67, 0.65], false),
-            // What helps beside it and does nothing alone is taken for chance.
-            ([1.03, 1.0, 0.67, 0.48], false),
-        ] {
-            let [before, with, ordinary, with_both] = losses;
-            assert_eq!(Losses { before, with, ordinary, with_both }.found(worthwhile), found, "{losses:?}");
-        }
-    }
-}
+mod tests;

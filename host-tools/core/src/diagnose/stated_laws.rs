@@ -6,12 +6,16 @@ use std::fmt::Write;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::law::{self, Form, Law};
 
-use super::selection::Chosen;
 use super::verdict::{Estimate, FoundLaw, Mismatch, Unexplained};
 use super::words::short;
 
-/// A law as it was fitted, `stds` being the standard deviations of its coefficients.
-pub(super) fn stated(law: &Law, active: &ActiveEffect, chosen: &Chosen, stds: &[Option<f64>]) -> FoundLaw {
+/// A law as it was fitted, with the losses on held-out data without and with it, and the standard deviations of its coefficients.
+pub(super) fn stated(
+    law: &Law,
+    active: &ActiveEffect,
+    [loss_before, loss_after]: [f64; 2],
+    stds: &[Option<f64>],
+) -> FoundLaw {
     let descriptor = active.descriptor();
     let coefficients: BTreeMap<String, Estimate> = descriptor
         .parameters
@@ -23,7 +27,7 @@ pub(super) fn stated(law: &Law, active: &ActiveEffect, chosen: &Chosen, stds: &[
             (spec.name.to_owned(), Estimate { value, std: *std, unit: spec.unit.to_owned(), at_bound })
         })
         .collect();
-    let heldout_improvement = 1.0 - chosen.loss_after / chosen.loss_before;
+    let heldout_improvement = 1.0 - loss_after / loss_before;
     let mut found = FoundLaw {
         component: descriptor.component.name().to_owned(),
         port: law.port().name().to_owned(),

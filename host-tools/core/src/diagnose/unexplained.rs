@@ -6,7 +6,7 @@
 
 mod locate;
 pub(super) mod samples;
-mod shape;
+pub(super) mod shape;
 pub(super) mod structure;
 
 use std::collections::BTreeMap;

@@ -130,6 +130,11 @@ impl ReplayInput {
         [self.t_s.first(), self.t_s.last()].map(|t_s| self.clock_offset_s + t_s.copied().unwrap_or(0.0))
     }
 
+    /// Clock of the bench at sample `k`, s.
+    pub(super) fn clock_at_s(&self, k: usize) -> f64 {
+        self.clock_offset_s + self.t_s[k]
+    }
+
     /// Sampling instants, s.
     #[must_use]
     pub fn t_s(&self) -> &[f64] {

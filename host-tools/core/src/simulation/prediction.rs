@@ -37,7 +37,8 @@ impl Prediction {
     ) -> Result<Vec<f64>, Failure> {
         let effects = EffectSet::from_slice(&[effect]).map_err(Failure::bad_input)?;
         let values = self.channel(channel).unwrap_or_default();
-        Ok(through(input.t_s(), values, |states, port| effects.measure(channel, states, port)))
+        let clocks_s: Vec<f64> = (0..values.len()).map(|k| input.clock_at_s(k)).collect();
+        Ok(through(&clocks_s, values, |states, port| effects.measure(channel, states, port)))
     }
 
     /// Values of a channel, which is left empty; empty for what was not predicted.

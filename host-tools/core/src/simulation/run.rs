@@ -48,14 +48,14 @@ impl Run<'_> {
         let mut states = FRESH_STATES;
         let mut theta_in_rad = |k: usize, dt_s: f64| {
             let motion = input.motion.as_ref()?;
-            let mut port = SensorPort { t_s: input.t_s[k], dt_s, value: motion.theta_rad[k] };
+            let mut port = SensorPort { t_s: input.clock_at_s(k), dt_s, value: motion.theta_rad[k] };
             effects.correct(Channel::ThetaIn, &mut states, &mut port);
             Some(port.value)
         };
         let mut wanted_rad = theta_in_rad(0, 0.0);
         let start_rad = wanted_rad.or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
-        plant.set_time_s(input.clock_s()[0]);
+        plant.set_time_s(input.clock_at_s(0));
         if self.drive == Drive::Duty || self.drive == Drive::Servo {
             plant.set_speed_rad_s(input.start_rad_s);
         }
@@ -111,7 +111,7 @@ impl Run<'_> {
                     plant.step(self.config, &step, dt_s);
                 }
             }
-            let outputs = sampler.sample(self.config, &plant, duty, (input.t_s[k], span_s));
+            let outputs = sampler.sample(self.config, &plant, duty, (input.clock_at_s(k), span_s));
             sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
         }
     }

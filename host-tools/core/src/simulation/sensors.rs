@@ -37,7 +37,7 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// Values of one sensor, sample by sample.
+/// Values of one sensor, sample by sample, at the given times of the bench.
 pub fn through(
     t_s: &[f64],
     values: &[f64],

@@ -273,20 +273,20 @@ pub(super) fn ends_of(x: &[f64]) -> (f64, f64) {
 ///
 /// A periodogram by least squares (Lomb, Astrophys. Space Sci. 39 (1976) 447), for rows at any distance: rates from `from` to
 /// `to` in steps of `step`, then finer about the best.
-pub(super) fn best_rate(rows: &Rows, (from, to): (f64, f64), step: f64) -> Option<f64> {
+pub(crate) fn best_rate(rows: &Rows, (from, to): (f64, f64), step: f64) -> Option<f64> {
     let coarse = scan(rows, from, step, ((to - from) / step) as usize + 1)?;
     let fine = 0.05 * step;
     scan(rows, (coarse - step).max(from), fine, 41)
 }
 
 /// What a rate is looked for in, one entry a row.
-pub(super) struct Rows {
+pub(crate) struct Rows {
     /// Variable.
-    pub(super) x: Vec<f64>,
+    pub(crate) x: Vec<f64>,
     /// What the wave describes.
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// What the wave is multiplied with.
-    pub(super) weights: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
 }
 
 fn scan(rows: &Rows, from: f64, step: f64, count: usize) -> Option<f64> {

@@ -1,0 +1,111 @@
+//! What is worth a name.
+
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effects::find;
+use nalgebra::DMatrix;
+
+use super::{Losses, Selected, largest_ordinary, negligible, worthwhile};
+use crate::fit::objective::{Objective, Residuals};
+use crate::fit::solver::Solution;
+use crate::joint_model::JointModel;
+use crate::test_bench;
+
+#[test]
+fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig() {
+    let bench = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
+    let effect = |id| ActiveEffect::with_defaults(find(id).unwrap());
+    let with = |effects: &[ActiveEffect]| JointModel { effects: effects.to_vec(), ..bench.clone() };
+    let (before, after) = (effect("motor_coulomb_friction"), effect("presliding_compliance"));
+    let found = effect("joint_spring");
+    let selected = Selected {
+        baseline: Solution {
+            model: bench.clone(),
+            values: Vec::new(),
+            stds: Vec::new(),
+            residuals: Residuals { values: Vec::new() },
+            spread: 1.0,
+            jacobian: DMatrix::zeros(0, 0),
+        },
+        plain: with(&[before]),
+        searched: with(&[after, found]),
+        ordinary: vec![after],
+        model: with(&[found]),
+        chosen: Vec::new(),
+        rounds: Vec::new(),
+        complete: true,
+    };
+    let withdrawn = selected.withdrawn();
+    assert_eq!(withdrawn.ordinary, [before]);
+    assert_eq!((withdrawn.model, withdrawn.searched), (bench.clone(), with(&[before])));
+}
+
+/// The largest of the benches that hide nothing, the smallest of those whose sheaths stick; much friction that falls at
+/// a crawl and a trace of it that falls late are neither.
+#[test]
+fn friction_that_falls_at_a_crawl_is_how_contacts_give_way() {
+    let recording = test_bench::swung(2000);
+    let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+    for (static_ratio, speed_m_s, left_out) in [
+        (1.563, 0.000_16, true),
+        (1.053, 0.001_42, true),
+        (1.656, 0.001_18, false),
+        (1.543, 0.005_15, false),
+        (1.05, 0.02, true),
+    ] {
+        let effect = ActiveEffect::with_defaults(find("sheath_stribeck_friction").unwrap())
+            .with("static_ratio", static_ratio)
+            .with("speed_m_s", speed_m_s);
+        assert_eq!(negligible(&objective, &bench, &effect), left_out, "{static_ratio} at {speed_m_s} m/s");
+    }
+}
+
+#[test]
+fn what_every_bench_has_and_what_the_travel_does_not_show_has_no_name() {
+    let recording = test_bench::swung(2000);
+    let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+    let friction = |share: f64| {
+        let largest_nm = largest_ordinary(&bench, "motor_coulomb_friction").unwrap();
+        ActiveEffect::with_defaults(find("motor_coulomb_friction").unwrap())
+            .with("torque_nm", share * largest_nm)
+    };
+    let cogging = |cycles_per_turn| {
+        ActiveEffect::with_defaults(find("motor_cogging").unwrap()).with("cycles_per_turn", cycles_per_turn)
+    };
+    for (effect, left_out) in
+        [(friction(0.99), true), (friction(1.5), false), (cogging(11.0), true), (cogging(13.0), false)]
+    {
+        assert_eq!(negligible(&objective, &bench, &effect), left_out, "{:?}", effect.parameters);
+    }
+}
+
+/// A fifth of what is left is worth a name up to ten squared scales; of a hundred it takes more than 22 %.
+#[test]
+fn where_much_is_left_an_effect_has_to_take_more_off() {
+    for (before, after, named) in
+        [(10.0, 8.0, true), (12.5, 10.0, true), (125.0, 100.0, false), (145.0, 100.0, true)]
+    {
+        assert_eq!(worthwhile(before, after), named, "{before} to {after}");
+    }
+}
+
+#[test]
+fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
+    for (losses, found) in [
+        // Nothing was left out.
+        ([1.0, 0.8, 1.0, 0.8], true),
+        ([1.0, 0.9, 1.0, 0.9], false),
+        // Dry friction beyond the ordinary: it takes the place of that.
+        ([1.2, 0.6, 0.7, 0.6], true),
+        // Viscous friction beside dry friction, neither of which does alone.
+        ([1.03, 0.71, 0.67, 0.48], true),
+        // What imitates the ordinary, does no better and adds nothing.
+        ([1.03, 0.71, 0.67, 0.65], false),
+        // What helps beside it and does nothing alone is taken for chance.
+        ([1.03, 1.0, 0.67, 0.48], false),
+    ] {
+        let [before, with, ordinary, with_both] = losses;
+        assert_eq!(Losses { before, with, ordinary, with_both }.found(worthwhile), found, "{losses:?}");
+    }
+}

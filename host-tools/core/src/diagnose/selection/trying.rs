@@ -1,0 +1,142 @@
+//! One round of the search: what screening ranks first is fitted, what then fits best is fitted to the end.
+
+use rayon::prelude::*;
+
+use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
+use crate::diagnose::candidates::candidates;
+use crate::diagnose::law_candidates::law_candidates;
+use crate::diagnose::onset::between_recordings;
+use crate::diagnose::screening::{Present, Screened, screen};
+use crate::fit::objective::Part;
+use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
+use crate::outcome::Failure;
+
+/// Candidates that are fitted, of those that screening ranks first.
+const FITTED: usize = 7;
+
+/// Held-out loss, over that of the best, beyond which a candidate is no finalist.
+const BEHIND: f64 = 2.5;
+
+/// Part of its estimated gain that a candidate's fit with the slopes of the present model has to reach; one that does not is fitted
+/// with slopes of its own.
+const KEPT_PROMISE: f64 = 0.5;
+
+impl Search<'_> {
+    /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
+    /// fitted to the end, of those that promise at least so much. Returns all candidates for the record, and the fits, best first.
+    pub(super) fn one_more(
+        &self,
+        present: &Fitted,
+        kind: Kind,
+        promising: f64,
+    ) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
+        let Self { objective, progress, .. } = *self;
+        let ranked = {
+            let predictions = objective.predict(&present.solution.model)?;
+            let model = present.without_ordinary();
+            let all = match kind {
+                Kind::Name => candidates(&model, objective, &predictions, self.asked),
+                Kind::Law => law_candidates(&model, objective, &predictions),
+            };
+            progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
+            let Fitted { layout, solution, .. } = present;
+            let present = Present { believed: self.believed, solution, layout, predictions: &predictions };
+            screen(objective, &present, &all, progress)
+        };
+        let promising = ranked.iter().filter(|s| s.gain > promising).take(FITTED).count();
+        let mut record: Vec<Attempted> = ranked
+            .iter()
+            .map(|s| Attempted { effect: s.start, promised: s.gain, heldout_loss: None })
+            .collect();
+        progress.stage("fitting effects", promising as u64);
+        let mut fits = self.fit_promising(present, &ranked[..promising])?;
+        let best_first = |fits: &mut Vec<(usize, Fitted)>| {
+            fits.retain(|(_, fitted)| {
+                !fitted.unseen && !negligible(objective, self.believed, &fitted.newest())
+            });
+            fits.sort_by(|(_, a), (_, b)| a.best_first(b));
+        };
+        let mut keep = |place: usize, fitted: &Fitted| {
+            record[place].effect = fitted.newest();
+            record[place].heldout_loss = Some(fitted.loss);
+        };
+        for (place, fitted) in &fits {
+            keep(*place, fitted);
+        }
+        best_first(&mut fits);
+        let farthest = fits.first().map_or(0.0, |(_, best)| BEHIND * best.loss);
+        let ahead = fits.iter().take(FINALISTS).take_while(|(_, fitted)| fitted.loss <= farthest).count();
+        fits[..ahead].par_iter_mut().try_for_each(|(_, fitted)| {
+            if !progress.interrupted() {
+                *fitted = self.finish(fitted)?;
+            }
+            Ok::<(), Failure>(())
+        })?;
+        for (place, fitted) in &fits[..ahead] {
+            keep(*place, fitted);
+        }
+        best_first(&mut fits);
+        // Finished fits may have fallen behind one that only ranks; what is chosen is fitted to the end.
+        while let Some((place, first)) = fits.first_mut().filter(|(_, first)| !first.finished)
+            && !progress.interrupted()
+        {
+            *first = self.finish(first)?;
+            keep(*place, first);
+            best_first(&mut fits);
+        }
+        Ok((record, fits.into_iter().map(|(_, fitted)| fitted).collect()))
+    }
+
+    fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
+        let finished = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])?;
+        let model = &finished.solution.model;
+        let unseen = between_recordings(self.objective, model, model.effects.len() - 1)?;
+        Ok(Fitted { unseen, ..finished })
+    }
+
+    /// `present` with each of the candidates, by their places, fitted only as far as a ranking needs.
+    fn fit_promising(&self, present: &Fitted, ranked: &[Screened]) -> Result<Vec<(usize, Fitted)>, Failure> {
+        let Self { objective, progress, .. } = *self;
+        // One fit by itself leaves threads idle between its rounds of slopes.
+        let fits: Result<Vec<Option<(usize, Fitted)>>, Failure> = ranked
+            .par_iter()
+            .enumerate()
+            .map(|(place, screened)| {
+                let fitted =
+                    (!progress.interrupted()).then(|| self.fit_new(present, screened, true)).transpose();
+                progress.advance(1);
+                Ok(fitted?.map(|fitted| (place, fitted)))
+            })
+            .collect();
+        let mut fits: Vec<(usize, Fitted)> = fits?.into_iter().flatten().collect();
+        // The slopes of the present model may have led astray: stick and slip bend the way. Where what was promised would still
+        // be the best, slopes of its own show the way.
+        let training = |fitted: &Fitted| objective.mean_loss(&fitted.solution.residuals, Part::Training);
+        let before = training(present);
+        let best = fits.iter().map(|(_, fitted)| training(fitted)).fold(f64::INFINITY, f64::min);
+        fits.par_iter_mut().try_for_each(|(place, fitted)| {
+            let screened = &ranked[*place];
+            let astray = training(fitted) > (1.0 - KEPT_PROMISE * screened.gain) * before;
+            if astray && (1.0 - screened.gain) * before < best && !progress.interrupted() {
+                let own = self.fit_new(present, screened, false)?;
+                if training(&own) < training(fitted) {
+                    *fitted = own;
+                }
+            }
+            Ok::<(), Failure>(())
+        })?;
+        Ok(fits)
+    }
+
+    /// `present` with one more effect, fitted only as far as a ranking needs, with the slopes of `present` or slopes of its own.
+    fn fit_new(&self, present: &Fitted, screened: &Screened, known_slopes: bool) -> Result<Fitted, Failure> {
+        let without = screened.room.as_ref().unwrap_or(&present.solution.model);
+        let (layout, with) = present.layout.with(without, screened.start);
+        let free = layout.free(self.believed, &with);
+        let gone = present.layout.parameters_missing_in(&layout, self.believed);
+        let slopes = present.solution.jacobian.clone().remove_columns_at(&gone);
+        let known = Known { jacobian: known_slopes.then_some(&slopes), spread: present.solution.spread };
+        let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
+        Ok(self.judged(layout, solution, false))
+    }
+}
