@@ -14,4 +14,5 @@ pub mod run;
 pub mod score;
 pub mod summary;
 pub mod tool;
+pub mod true_law;
 pub mod truth;

@@ -29,7 +29,7 @@ struct Options {
     /// A sample of 24 rigs of all groups; proof.md stays as it is
     #[arg(long)]
     quick: bool,
-    /// Only a group (single, pair, triple, nothing, parameters, outside), an effect, or cases whose name begins so.
+    /// Only a group (single, pair, triple, nothing, parameters, outside, mixed …), an effect, or cases whose name begins so.
     /// May be repeated; proof.md stays as it is
     #[arg(long, value_name = "GROUP|EFFECT")]
     only: Vec<String>,

@@ -68,6 +68,21 @@ pub struct Unexplained {
     pub channel: String,
 }
 
+/// A law that a diagnosis states.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SaidLaw {
+    /// Where it acts.
+    pub port: String,
+    /// On what it depends.
+    pub variables: Vec<String>,
+    /// Channel, for a sensor.
+    pub channel: Option<String>,
+    /// Formula.
+    pub formula: String,
+    /// Fitted coefficients.
+    pub coefficients: BTreeMap<String, Stated>,
+}
+
 /// What is scored of a `diagnosis.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Said {
@@ -79,6 +94,9 @@ pub struct Said {
     pub recalibrated: Vec<Recalibrated>,
     /// What no named effect explains.
     pub unexplained: Option<Unexplained>,
+    /// Laws that describe it, the first the largest.
+    #[serde(default)]
+    pub laws: Vec<SaidLaw>,
 }
 
 /// Root mean square error of each predicted channel on the held-out recording, in its unit.

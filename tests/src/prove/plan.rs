@@ -37,6 +37,9 @@ const NO_TENSIONS: usize = 20;
 /// Number of rigs with tensions at the motor alone, of dirty files and of slow ones.
 const OTHERWISE_RECORDED: usize = 12;
 
+/// Number of rigs with a listed effect and an unlisted law.
+const MIXED: usize = 16;
+
 /// One case in so many of those that are recorded otherwise hides nothing.
 const HIDING_NOTHING: usize = 4;
 
@@ -71,11 +74,13 @@ pub enum Group {
     Dirty,
     /// Recorded at 100 Hz; one effect in three cases of four.
     Slow,
+    /// One effect of the catalogue and, in another component, one law that it has no name for.
+    Mixed,
 }
 
 impl Group {
     /// All groups in the order of the run.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Single,
         Self::Pair,
         Self::Triple,
@@ -88,6 +93,7 @@ impl Group {
         Self::MotorSide,
         Self::Dirty,
         Self::Slow,
+        Self::Mixed,
     ];
 
     /// What of the motion is in the training recording.
@@ -118,6 +124,7 @@ impl Group {
             Self::MotorSide => "motor-side",
             Self::Dirty => "dirty",
             Self::Slow => "slow",
+            Self::Mixed => "mixed",
         }
     }
 
@@ -133,7 +140,8 @@ impl Group {
             | Self::NoTensions
             | Self::MotorSide
             | Self::Dirty
-            | Self::Slow => 1,
+            | Self::Slow
+            | Self::Mixed => 1,
         }
     }
 }
@@ -263,6 +271,10 @@ pub fn plans(seed: u64) -> Vec<Plan> {
         let effects = if number % 2 == 0 { Vec::new() } else { many(1, plan.seed) };
         plans.push(Plan { effects, off: wrong_geometry(plan.seed), ..plan });
     }
+    for number in 0..MIXED {
+        let plan = Plan::new(Group::Mixed, &format!("{number:02}"), seed);
+        plans.push(Plan { effects: with_a_law(plan.seed), ..plan });
+    }
     for (group, cases) in [
         (Group::NoTensions, NO_TENSIONS),
         (Group::MotorSide, OTHERWISE_RECORDED),
@@ -291,6 +303,15 @@ fn many(wanted: usize, seed: u64) -> Vec<(&'static str, f64)> {
         }
     }
     effects.into_iter().map(|(id, _)| (id, 1.0)).collect()
+}
+
+/// A listed effect and a law of another component.
+fn with_a_law(seed: u64) -> Vec<(&'static str, f64)> {
+    let mut draw = Draw::new(seed);
+    let laws: Vec<_> = ids(true).into_iter().filter(|(id, _)| id.starts_with("unlisted_")).collect();
+    let (law, component) = laws[draw.index(laws.len())];
+    let listed: Vec<_> = ids(false).into_iter().filter(|(_, other)| *other != component).collect();
+    vec![(listed[draw.index(listed.len())].0, 1.0), (law, 1.0)]
 }
 
 /// Output radius and arm, each off by 4 to 6 % either way: more than a caliper errs, less than a glance at a plot shows.
@@ -403,7 +424,8 @@ mod tests {
         assert!(count(&plans, Group::Outside) >= 3 * 4);
         let recorded = [Group::NoTensions, Group::MotorSide, Group::Dirty, Group::Slow];
         assert_eq!(recorded.map(|group| count(&plans, group)), [20, 12, 12, 12]);
-        assert_eq!([Group::Many, Group::Geometry].map(|group| count(&plans, group)), [20, 20]);
+        let more = [Group::Many, Group::Geometry, Group::Mixed];
+        assert_eq!(more.map(|group| count(&plans, group)), [20, 20, 16]);
     }
 
     #[test]
@@ -437,6 +459,11 @@ mod tests {
                 Group::NoTensions | Group::MotorSide | Group::Dirty | Group::Slow => {
                     assert!(plan.off.is_empty() && plan.hidden().len() <= 1, "{}", plan.name);
                 }
+                Group::Mixed => {
+                    let [listed, law] = &case.effects[..] else { panic!("{}", plan.name) };
+                    assert!(!listed.is_outside_catalogue() && law.is_outside_catalogue());
+                    assert!(listed.component() != law.component(), "{}", plan.name);
+                }
                 Group::Many => assert!((4..=5).contains(&plan.hidden().len()), "{}", plan.name),
                 _ => assert!(plan.off.is_empty() && !plan.hidden().is_empty()),
             }
@@ -455,7 +482,7 @@ mod tests {
     #[test]
     fn a_quick_sample_has_all_groups_and_mixes_strength_and_noise() {
         let sample = quick_sample(plans(1));
-        assert_eq!(Group::ALL.map(|group| count(&sample, group)), [12, 3, 1, 3, 2, 3, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(Group::ALL.map(|group| count(&sample, group)), [12, 3, 1, 3, 2, 3, 1, 1, 1, 1, 1, 1, 1]);
         let singles: Vec<&Plan> = sample.iter().filter(|plan| plan.group == Group::Single).collect();
         let kinds: BTreeSet<&str> = singles
             .iter()

@@ -2,6 +2,7 @@
 
 use super::outcome::{Errors, Outcome, Said, SaidEffect};
 use super::plan::Group;
+use super::true_law::TrueLaw;
 use super::truth::{TrueEffect, Truth};
 
 /// Scores of one case; `None` where a score does not apply.
@@ -21,6 +22,9 @@ pub struct Score {
     pub unexplained: bool,
     /// Whether the first named effect, or what is left unexplained, lies in a component that conceals something.
     pub component: Option<bool>,
+    /// Whether a stated law has port (and channel), variable and form of the concealed one, each beside what stands before it; `None`
+    /// where no rig file could state one.
+    pub law: Option<[bool; 3]>,
     /// Stated onset minus true one, s, for each concealed effect that has one and is named.
     pub onset_errors_s: Vec<f64>,
     /// Relative error of each parameter of the named concealed effects: `id.parameter` and error.
@@ -45,7 +49,8 @@ pub fn score(outcome: &Outcome) -> Score {
     let silent = catalogued(outcome).then_some(false);
     let Some(said) = &outcome.said else {
         let named = [outcome.truth.effects.len(), 0];
-        return Score { top1: silent, all_named: silent, named, ..Score::default() };
+        let law = outcome.truth.laws.first().map(|_| [false; 3]);
+        return Score { top1: silent, all_named: silent, named, law, ..Score::default() };
     };
     let truth = &outcome.truth;
     let concealed = |id: &str| truth.effects.iter().any(|effect| effect.id == id);
@@ -58,6 +63,10 @@ pub fn score(outcome: &Outcome) -> Score {
     Score {
         right: match outcome.group {
             Group::Outside => said.verdict == "unexplained" && component(said, truth) == Some(true),
+            Group::Mixed => {
+                let left = said.unexplained.as_ref().map(|unexplained| &unexplained.component);
+                exact && truth.outside.iter().any(|(_, component)| Some(component) == left)
+            }
             Group::Nothing => exact && matches!(said.verdict.as_str(), "consistent" | "recalibrate"),
             Group::Parameters => exact && said.verdict == "recalibrate",
             Group::Geometry if truth.effects.is_empty() => exact && said.verdict == "recalibrate",
@@ -72,6 +81,7 @@ pub fn score(outcome: &Outcome) -> Score {
         false_alarms,
         unexplained: said.unexplained.is_some(),
         component: component(said, truth),
+        law: truth.laws.first().map(|law| law_found(said, law)),
         onset_errors_s: of_named(said, truth)
             .filter_map(|(true_effect, effect)| Some(effect.onset_s? - true_effect.onset_s?))
             .collect(),
@@ -95,6 +105,16 @@ pub fn score(outcome: &Outcome) -> Score {
         },
         statements: said.effects.iter().map(|effect| (effect.probability, concealed(&effect.id))).collect(),
     }
+}
+
+/// The best of the stated laws: port, variable, form.
+fn law_found(said: &Said, truth: &TrueLaw) -> [bool; 3] {
+    let found = said.laws.iter().map(|law| {
+        let port = law.port == truth.port && law.channel == truth.channel;
+        let variable = port && law.variables == [truth.variable.clone()];
+        [port, variable, variable && law.formula == truth.formula]
+    });
+    found.max().unwrap_or_default()
 }
 
 /// Whether the case conceals an effect of the catalogue.
@@ -210,6 +230,7 @@ pub fn concealed_shortly(outcome: &Outcome) -> String {
     });
     let words: Vec<String> = effects
         .chain(truth.outside.iter().map(|(id, component)| format!("{id} ({component})")))
+        .chain(truth.laws.iter().map(|law| format!("{} = {}", law.port, law.formula)))
         .chain(truth.parameters_off.iter().cloned())
         .collect();
     if words.is_empty() { "nothing".to_owned() } else { words.join(", ") }
@@ -282,6 +303,28 @@ mod tests {
         let found = score(&outcome(Group::Nothing, &[], named));
         assert_eq!((found.right, found.component, found.top1), (false, None, None));
         assert_eq!(found.false_alarms, ["tendon_creep"]);
+    }
+
+    #[test]
+    fn of_the_stated_laws_the_best_counts_and_a_form_only_of_the_right_variable() {
+        let mut case = outcome(Group::Outside, &[], diagnosis("unexplained", &[]));
+        case.truth.laws = vec![TrueLaw {
+            port: "reading".to_owned(),
+            variable: "t_s".to_owned(),
+            formula: "a * t_s".to_owned(),
+            channel: Some("f1_n".to_owned()),
+        }];
+        let mut found = |laws: serde_json::Value| {
+            case.said.as_mut().unwrap().laws = serde_json::from_value(laws).unwrap();
+            score(&case).law
+        };
+        let law = |port, variable, channel, formula| json!({ "port": port, "variables": [variable], "channel": channel, "formula": formula, "coefficients": {} });
+        assert_eq!(found(json!([])), Some([false; 3]));
+        assert_eq!(found(json!([law("reading", "t_s", "f2_n", "a * t_s")])), Some([false; 3]));
+        assert_eq!(found(json!([law("reading", "value", "f1_n", "a * t_s")])), Some([true, false, false]));
+        let near = law("reading", "t_s", "f1_n", "a * t_s^2");
+        assert_eq!(found(json!([near])), Some([true, true, false]));
+        assert_eq!(found(json!([near, law("reading", "t_s", "f1_n", "a * t_s")])), Some([true; 3]));
     }
 
     #[test]

@@ -122,6 +122,15 @@ impl Summary {
         let hiding_nothing = || self.group(Group::Nothing).chain(self.group(Group::Parameters));
         let false_physics = Rate::count(hiding_nothing().map(|score| !score.false_alarms.is_empty()));
         let outside = Rate::count(self.group(Group::Outside).map(|score| score.right));
+        let laws: Vec<[bool; 3]> = self.group(Group::Outside).filter_map(|score| score.law).collect();
+        let [port, variable, form] = [0, 1, 2].map(|part| Rate::count(laws.iter().map(|law| law[part])));
+        let with_law = |score: &&Score| score.law.is_some();
+        let unlisted =
+            Rate::count(self.group(Group::Outside).filter(with_law).map(|s| s.false_alarms.is_empty()));
+        let modelled: Vec<f64> =
+            self.group(Group::Outside).filter(with_law).filter_map(|s| s.heldout_ratio).collect();
+        let of_modelled = |part| quantile(modelled.iter().copied(), part);
+        let mixed = Rate::count(self.group(Group::Mixed).map(|score| score.right));
         let of_many = self.group(Group::Many).map(|score| score.named);
         let [concealed, named] = of_many.fold([0, 0], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
         let named = Rate { hits: named, of: concealed };
@@ -163,6 +172,48 @@ impl Summary {
                 found: outside.to_string(),
                 wanted: "≥ 90 %",
                 met: at_least(outside, 0.90),
+            },
+            Goal {
+                what: "laws: not named as something listed",
+                found: unlisted.to_string(),
+                wanted: "≥ 90 %",
+                met: at_least(unlisted, 0.90),
+            },
+            Goal {
+                what: "laws: right port",
+                found: port.to_string(),
+                wanted: "≥ 90 %",
+                met: at_least(port, 0.90),
+            },
+            Goal {
+                what: "laws: right port and variable",
+                found: variable.to_string(),
+                wanted: "≥ 85 %",
+                met: at_least(variable, 0.85),
+            },
+            Goal {
+                what: "laws: right port, variable and form",
+                found: form.to_string(),
+                wanted: "≥ 75 %",
+                met: at_least(form, 0.75),
+            },
+            Goal {
+                what: "laws: held-out error over that of the true law, median",
+                found: share(of_modelled(0.5)),
+                wanted: "≤ 1.3",
+                met: of_modelled(0.5).map(|ratio| ratio <= 1.3),
+            },
+            Goal {
+                what: "laws: the same, nine of ten",
+                found: share(of_modelled(0.9)),
+                wanted: "≤ 2",
+                met: of_modelled(0.9).map(|ratio| ratio <= 2.0),
+            },
+            Goal {
+                what: "a listed effect and a law: both right",
+                found: mixed.to_string(),
+                wanted: "≥ 75 %",
+                met: at_least(mixed, 0.75),
             },
             Goal {
                 what: "four or five effects: named",

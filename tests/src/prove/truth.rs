@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use virtual_bench::{BenchConfig, Case, ConcealedEffect};
 
 use super::plan::{DISTRIBUTED_FRICTION, Plan};
+use super::true_law::{TrueLaw, table, true_law};
 
 /// Age of the effects when the held-out recording begins, s: the length of the training recording.
 pub const TRAINING_S: f64 = 40.0;
@@ -65,6 +66,9 @@ pub struct Truth {
     pub effects: Vec<TrueEffect>,
     /// Physics outside the catalogue: id and component.
     pub outside: Vec<(String, String)>,
+    /// The laws that a rig file states for it.
+    #[serde(default)]
+    pub laws: Vec<TrueLaw>,
     /// Parameters that are off by more than a bench's few per cent, by `section.name`.
     pub parameters_off: Vec<String>,
     /// True nominal parameters by `section.name`.
@@ -98,7 +102,7 @@ impl Counterpart {
     }
 }
 
-/// `None` for physics that no rig file can say.
+/// `None` for physics that has no name.
 fn counterpart(effect: &ConcealedEffect, bench: &BenchConfig) -> Option<Counterpart> {
     use ConcealedEffect as E;
     let one = |name, value| Counterpart::of(vec![(name, value, true)]);
@@ -198,6 +202,7 @@ impl Truth {
             let component = effect.component().as_str().to_owned();
             let Some(twin) = counterpart(effect, &case.truth) else {
                 truth.outside.push((effect.id().to_owned(), component));
+                truth.laws.extend(true_law(effect));
                 continue;
             };
             let scored = twin.parameters.iter().filter(|(_, _, scored)| *scored);
@@ -281,7 +286,14 @@ pub fn true_rig(case: &Case) -> String {
     let mut tables = String::new();
     let mut ids: Vec<&str> = Vec::new();
     for effect in &case.effects {
-        let Some(twin) = counterpart(effect, &case.truth) else { continue };
+        let Some(twin) = counterpart(effect, &case.truth) else {
+            let law = table(effect, &mut bench);
+            if law.contains("[effects.sensor_offset]") {
+                ids.push("sensor_offset");
+            }
+            tables += &law;
+            continue;
+        };
         let mut parameters: Vec<(&str, f64)> =
             twin.parameters.iter().map(|(name, value, _)| (*name, *value)).collect();
         match effect {
@@ -332,8 +344,10 @@ mod tests {
                 Rig::parse(&text, "truth.toml").unwrap_or_else(|error| panic!("{}: {error}", plan.name));
             drop(rig);
             let gone = ["wrap_angle_disturbed", "tendon_creep"];
+            let outside = Truth::of(&plan, &case).outside;
+            let outside: Vec<&str> = outside.iter().map(|(id, _)| id.as_str()).collect();
             for (id, _) in &plan.effects {
-                let expected = plan.group != Group::Outside && !gone.contains(id);
+                let expected = !outside.contains(id) && !gone.contains(id);
                 assert_eq!(text.contains(&format!("[effects.{id}]")), expected, "{}\n{text}", plan.name);
             }
         }
