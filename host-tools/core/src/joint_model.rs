@@ -31,6 +31,8 @@ pub struct OwnParameters {
     pub values: Vec<OwnParameter>,
     /// Those that every bench has for itself: the shared value means nothing.
     pub everywhere: Vec<RigParameter>,
+    /// Those of which the recordings that are fitted to tell nothing that another parameter does not take up: they stay as stated.
+    pub untold: Vec<RigParameter>,
 }
 
 /// A joint as it is to be simulated.

@@ -89,14 +89,17 @@ pub fn recalibrated(model: &JointModel) -> Vec<Free> {
     shared(model).chain(of_benches).collect()
 }
 
-/// The listed parameters that `model` has and that not every bench has for itself.
+/// The listed parameters that `model` has, that the recordings tell of, and that not every bench has for itself.
 fn shared(model: &JointModel) -> impl Iterator<Item = Free> + '_ {
     let runs_freely = matches!(model.drive(), Ok(Drive::Duty | Drive::Servo));
     CALIBRATED
         .iter()
         .filter(move |listed| runs_freely || !listed.free_running)
         .filter_map(|listed| Free::nominal(model, listed.section, listed.name))
-        .filter(|free| !free.place().is_any_of(&model.own.everywhere))
+        .filter(|free| {
+            let place = free.place();
+            !place.is_any_of(&model.own.everywhere) && !place.is_any_of(&model.own.untold)
+        })
 }
 
 /// The same as [`recalibrated`], with what `believed` states as the prior, wherever `model` has got to.

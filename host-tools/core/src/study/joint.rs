@@ -1,11 +1,14 @@
 //! The joint that the recordings of a study share, and what is different in each of them.
 
+use bowden_model::channel::Channel;
+
 use super::{Bench, Role, Study, StudyRecording};
 use crate::fit::calibrated::{CALIBRATED, Calibrated};
 use crate::fit::observed::{Observed, Use};
 use crate::fit::variation::Variation;
 use crate::joint_model::{JointModel, OwnParameter, OwnParameters};
 use crate::outcome::Failure;
+use crate::recording::Recording;
 use crate::rig::RigParameter;
 
 impl Study {
@@ -33,8 +36,22 @@ impl Study {
                 .all(|bench| values.iter().any(|own| own.bench == bench && own.parameter == *parameter))
         };
         let everywhere = RigParameter::nominal().filter(on_every_bench).collect();
-        joint.own = OwnParameters { values, everywhere };
+        let untold = self.untold_pretension(&joint);
+        joint.own = OwnParameters { values, everywhere, untold };
         Ok(joint)
+    }
+
+    /// The pretension, where no recording that is fitted to holds a tension: of friction and pretension little more than the product
+    /// shows then, and fitted together the two run off against each other, and the tensions with them.
+    fn untold_pretension(&self, joint: &JointModel) -> Vec<RigParameter> {
+        let holds_tension = |recording: &Recording| {
+            Channel::TENSIONS.iter().any(|channel| recording.channel(*channel).is_some())
+        };
+        let mut fitted = self.recordings_as(Role::Training).chain(self.recordings_as(Role::Experiment));
+        if joint.parameters.sheath.is_none() || fitted.any(holds_tension) {
+            return Vec::new();
+        }
+        RigParameter::parse("tendon.pretension_n").into_iter().collect()
     }
 
     /// The recordings with their differences from `joint`, that of [`Study::joint`]; held-out ones last. Where none is held out,
@@ -192,5 +209,24 @@ mod tests {
         assert_eq!(gaps(&joint), [0.01, 0.01], "before a fit has moved it, the effect is as it was found");
         joint.own.values[0].value = Some(0.03);
         assert_eq!(gaps(&joint), [0.01, 0.03]);
+    }
+
+    #[test]
+    fn without_a_recorded_tension_the_pretension_stays_as_stated() {
+        let recording = |channels: &[Channel]| {
+            let t_s = test_bench::swung(10).t_s().to_vec();
+            let all = [Channel::ThetaIn].iter().chain(channels);
+            all.fold(Recording::new("any", t_s), |recording, channel| recording.with(*channel, vec![0.1; 10]))
+        };
+        let moved = |training: Vec<Recording>, heldout: Vec<Recording>| {
+            let joint = Study::of_bench(test_bench::rig(), training, heldout).joint().unwrap();
+            recalibrated(&joint).iter().any(|free| free.path(&joint) == "tendon.pretension_n")
+        };
+        let plain = || vec![recording(&[Channel::ThetaOut])];
+        let seen = || vec![recording(&[Channel::ThetaOut, Channel::F2])];
+        assert!(!moved(plain(), Vec::new()));
+        assert!(!moved(plain(), seen()), "what only judges tells a fit nothing");
+        assert!(moved(seen(), Vec::new()));
+        assert!(moved([plain(), seen()].concat(), Vec::new()));
     }
 }
