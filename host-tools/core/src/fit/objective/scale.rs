@@ -1,0 +1,70 @@
+//! In what a residual is measured, and how much a large one counts.
+
+use bowden_model::channel::Channel;
+use bowden_model::drive::pulley_stall_torque_nm;
+
+use super::Series;
+use super::blockwise::moments;
+use super::dataset::Dataset;
+use crate::joint_model::JointModel;
+use crate::reconstruct::quantum_of;
+
+/// Share of a channel's standard deviation that counts as agreement.
+const MODEL_FLOOR: f64 = 0.015;
+
+/// Same for angles, which a transmission of a few N·m/mrad reproduces far better than its tensions.
+const ANGLE_FLOOR: f64 = 0.002;
+
+/// Residual at which the soft L1 loss bends, in scales.
+const LOSS_BEND: f64 = 3.0;
+
+/// Loss of a residual: `r²` up to the bend, growing with `|r|` beyond.
+#[must_use]
+pub fn loss(residual: f64) -> f64 {
+    soft(residual).powi(2)
+}
+
+/// The number whose square is the soft L1 loss of `residual`.
+#[must_use]
+pub fn soft(residual: f64) -> f64 {
+    let z = residual / LOSS_BEND;
+    LOSS_BEND * (2.0 * ((1.0 + z * z).sqrt() - 1.0)).sqrt().copysign(residual)
+}
+
+fn recorded(datasets: &[Dataset], series: Series) -> impl Iterator<Item = &[f64]> {
+    datasets
+        .iter()
+        .flat_map(move |d| d.measured.iter().filter(move |(s, _)| *s == series).map(|(_, v)| v.as_slice()))
+}
+
+/// White noise of the sensor, and a twelfth of its step squared.
+pub(super) fn noise_variance(model: &JointModel, series: Series, datasets: &[Dataset]) -> f64 {
+    let Series::Channel(channel) = series else { return 0.0 };
+    let sensors = &model.parameters.sensors;
+    let noise = match channel {
+        Channel::F1 | Channel::F2 | Channel::F3 | Channel::F4 => sensors.tension_noise_n,
+        Channel::MotorCurrent => sensors.current_noise_a,
+        _ => 0.0,
+    };
+    let quantum = recorded(datasets, series).filter_map(quantum_of).fold(0.0, f64::max);
+    noise * noise + quantum * quantum / 12.0
+}
+
+/// What a residual of a series is measured in, in its unit.
+pub(super) fn scale_of(model: &JointModel, series: Series, noise_variance: f64, datasets: &[Dataset]) -> f64 {
+    match series {
+        Series::Guide => {
+            // Of the stall torque of the motor: what a gear loses unnoticed.
+            const SHARE: f64 = 0.0015;
+            SHARE * model.parameters.motor.map_or(1.0, |motor| pulley_stall_torque_nm(&motor))
+        }
+        Series::Channel(channel) => {
+            let floor = match channel {
+                Channel::ThetaIn | Channel::ThetaOut | Channel::ThetaMotor => ANGLE_FLOOR,
+                _ => MODEL_FLOOR,
+            };
+            let spread = recorded(datasets, series).map(|v| moments(v).variance).fold(0.0, f64::max);
+            (noise_variance + floor * floor * spread).sqrt().max(f64::MIN_POSITIVE)
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! What is compared, and what is not.
+
+use bowden_model::effect::Target;
+use bowden_model::effects::find;
+
+use super::*;
+use crate::simulation::replay;
+use crate::test_bench;
+
+/// What a fit compares block by block is what stands in whole predictions, bit for bit: amplifiers that stop at zero, an angle
+/// whose zero is free, and the torque that guides a motor among it.
+#[test]
+fn a_replay_compared_as_it_runs_is_compared_as_a_whole() {
+    let samples = 2345;
+    let mut recording = test_bench::swung(samples);
+    let wave = |k: u32| 0.12 * (4e-3 * f64::from(k)).cos() + 0.05;
+    recording.set(Channel::Duty, (0..samples).map(wave).collect());
+    recording.set(Channel::BusVoltage, vec![24.0; samples as usize]);
+    let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    model.free_offsets = vec![Channel::ThetaOut];
+    let objective = Objective::new(&model, &[recording.clone(), recording], &[], true).unwrap();
+    assert!(objective.datasets[0].cut_at_zero.contains(&Channel::F1));
+    assert!(objective.scales().iter().any(|(series, _)| *series == Series::Guide));
+    let as_it_runs = objective.residuals(&model).unwrap();
+    assert_eq!(as_it_runs, objective.compare(&objective.predict(&model).unwrap()));
+    assert_eq!(as_it_runs.values.len(), objective.entries().count());
+    assert!(as_it_runs.values.iter().any(|value| value.abs() > 1.0));
+}
+
+/// What was not measured is not compared, but a winding heats whether its current was recorded or not.
+#[test]
+fn of_what_was_not_measured_the_current_alone_is_predicted() {
+    let mut recording = test_bench::swung(2000);
+    recording.set(Channel::Duty, vec![0.1; 2000]);
+    recording.set(Channel::BusVoltage, vec![24.0; 2000]);
+    let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let unmeasured = [Channel::MotorCurrent, Channel::ThetaMotor];
+    assert!(unmeasured.iter().all(|channel| model.outputs.contains(channel)));
+    let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+    let predictions = objective.predict(&model).unwrap();
+    let is_predicted = |channel| predictions[0].channel(channel).is_some();
+    assert_eq!(unmeasured.map(is_predicted), [true, false]);
+}
+
+/// Where the zero of an angle is free, another zero changes nothing, and where it is not, everything.
+#[test]
+fn a_free_zero_makes_no_difference() {
+    let with_zero_at = |zero_rad: f64| {
+        let theta_out_rad = |k: u32| 0.35 * (4e-3 * f64::from(k)).sin() + zero_rad;
+        test_bench::swung(2345).with(Channel::ThetaOut, (0..2345).map(theta_out_rad).collect())
+    };
+    let (recording, shifted) = (with_zero_at(0.0), with_zero_at(0.1));
+    let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let mut seen = |free_offsets: &[Channel], recording: &Recording| {
+        model.free_offsets = free_offsets.to_vec();
+        let objective = Objective::new(&model, std::slice::from_ref(recording), &[], true).unwrap();
+        let predictions = objective.predict(&model).unwrap();
+        let rmse = objective.rmse(&predictions, Series::Channel(Channel::ThetaOut), Part::HeldOut);
+        (rmse, objective.residuals(&model).unwrap().values)
+    };
+    let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let [(rmse, plain), (rmse_shifted, other)] =
+        [&recording, &shifted].map(|recording| seen(&[Channel::ThetaOut], recording));
+    assert!((rmse - rmse_shifted).abs() < 1e-9 && change(&plain, &other) < 1e-6);
+    let (stated, all) = seen(&[], &recording);
+    let (stated_shifted, all_shifted) = seen(&[], &shifted);
+    assert!((stated_shifted - stated).abs() > 0.01 && change(&all, &all_shifted) > 1.0);
+}
+
+/// A nominal tendon pushes where the real one hangs slack and its amplifier reads zero. Only where it does is the
+/// prediction cut.
+#[test]
+fn a_tension_that_stood_at_zero_is_predicted_at_zero() {
+    let mut recording = test_bench::swung(2000);
+    for (channel, rest) in Channel::TENSIONS.into_iter().zip([0.0, 2.0, 0.0, -0.1]) {
+        let values = (0..2000).map(|k| if k % 2 == 0 { 0.0 } else { rest });
+        let touched =
+            values.enumerate().map(|(k, value)| if channel == Channel::F2 && k > 30 { 1.0 } else { value });
+        recording.set(channel, touched.collect());
+    }
+    let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    model.parameters.tendon.as_mut().unwrap().pretension_n = 2.0;
+    let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+    let predictions = objective.predict(&model).unwrap();
+    let lowest = |channel: Channel| {
+        predictions[0].channel(channel).unwrap().iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let plain = replay(&model, &objective.datasets[0].input).unwrap();
+    for channel in Channel::TENSIONS {
+        assert!(plain.channel(channel).unwrap().iter().any(|tension| *tension < -1.0), "{channel:?}");
+    }
+    assert_eq!([Channel::F1, Channel::F3].map(lowest), [0.0, 0.0]);
+    // Hardly ever on zero, and below it.
+    assert!([Channel::F2, Channel::F4].map(lowest).iter().all(|tension| *tension < -1.0));
+    // A sensor that is found to read too little ends at the same zero.
+    let mut offset = ActiveEffect::with_defaults(find("sensor_offset").unwrap()).with("offset", -1.0);
+    offset.target = Target::One(Channel::F1);
+    let seen = objective.residuals_seen_through(&predictions, offset).unwrap();
+    model.effects.push(offset);
+    assert_eq!(seen.values, objective.residuals(&model).unwrap().values);
+}
