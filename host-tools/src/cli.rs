@@ -46,6 +46,8 @@ enum Command {
     Fit(FitArguments),
     /// Simulate a rig from a reference: controller, motor, joint and sensors
     Simulate(SimulateArguments),
+    /// Make effects of the catalogue from what diagnoses have found
+    Effect(crate::commands::effect::EffectArguments),
     /// Run the joint on a driver board along a reference and record every control tick
     Record(crate::commands::record::RecordArguments),
     /// Excite, diagnose, correct and verify the joint on a driver board, all in one
@@ -93,6 +95,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Replay(arguments) => arguments.run(),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Simulate(arguments) => arguments.run(),
+        Command::Effect(arguments) => arguments.run(),
         Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),

@@ -4,6 +4,7 @@ pub mod check;
 pub mod convert;
 mod course;
 pub mod diagnose;
+pub mod effect;
 pub mod faults;
 pub mod fit;
 pub mod investigate;

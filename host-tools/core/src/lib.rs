@@ -5,7 +5,9 @@
 #![forbid(unsafe_code)]
 
 pub mod diagnose;
+pub mod effect_source;
 pub mod fit;
+pub mod formula;
 pub mod joint_model;
 pub mod outcome;
 pub mod output;
