@@ -377,8 +377,13 @@ impl Case<'_> {
                 (series.name().to_owned(), fit)
             })
             .collect();
-        let summary =
-            words::summary(verdict, &effects, &recalibrated_parameters, loss_recalibrated, loss_after);
+        let summary = words::summary(
+            verdict,
+            &effects,
+            &recalibrated_parameters,
+            !laws.is_empty(),
+            [loss_recalibrated, loss_after],
+        );
         let diagnosis = Diagnosis {
             schema: SCHEMA.to_owned(),
             verdict,
