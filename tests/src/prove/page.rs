@@ -84,7 +84,7 @@ fn groups(page: &mut String, summary: &Summary) -> std::fmt::Result {
         page,
         "\n## By group\n\nRight: exactly what is concealed was said. Ratio: held-out error of the diagnosed rig over that of the\n\
          true physics with the true parameters, replayed alike (root mean square over the channels); rows of physics\n\
-         outside the catalogue compare with the true parameters alone, because no rig file can say the rest.\n"
+         outside the catalogue compare with the law that a rig file can state, and where there is none with the true parameters alone.\n"
     )?;
     writeln!(
         page,
