@@ -1,14 +1,17 @@
 //! Levenberg–Marquardt on the replay residuals.
 
+mod problem;
+
+use std::sync::Mutex;
+
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn};
-use rayon::prelude::*;
+use nalgebra::{DMatrix, DVector};
 
 use super::free::Free;
 use super::objective::{Aspect, Entry, Objective, Part, Residuals, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
+use problem::Problem;
 
 /// Step of the difference quotients in the optimiser's coordinate that sees the slope through the roughness that stick,
 /// slip and impacts leave in the residuals.
@@ -16,6 +19,9 @@ pub const COARSE_STEP: f64 = 0.1;
 
 /// Step that then finds the place.
 pub const FINE_STEP: f64 = 0.02;
+
+/// Longest first step of a round, in the optimiser's coordinate of the parameter that the residuals answer to most.
+const FIRST_STEP: f64 = 0.5;
 
 /// Result of a fit.
 #[derive(Clone, Debug)]
@@ -33,72 +39,6 @@ pub struct Solution {
     /// Slopes of the weighted residuals over the optimiser's coordinates, training rows and priors; empty after a fit that
     /// only ranks.
     pub jacobian: DMatrix<f64>,
-}
-
-struct Problem<'a> {
-    objective: &'a Objective,
-    model: &'a JointModel,
-    free: &'a [Free],
-    fixed: Vec<bool>,
-    step: f64,
-    /// Factor of the priors: what a weighted residual is spread by. Where the model misses the data by twenty scales, a change
-    /// that takes a scale off proves nothing against what is believed.
-    prior_weight: f64,
-    /// Slopes over the first parameters that are taken as known.
-    known: Option<&'a DMatrix<f64>>,
-    x: DVector<f64>,
-    current: Option<Residuals>,
-    /// Slopes at the place where the round begins.
-    begun: Option<(DVector<f64>, DMatrix<f64>)>,
-}
-
-impl Problem<'_> {
-    /// Weighs the priors by what the parameters cannot take off here: how far a fit still has to go says nothing of what will be left.
-    fn weigh_priors(&mut self) {
-        let (Some(slopes), Some(current)) = (self.slopes(), &self.current) else { return };
-        let rows = DVector::from_vec(training_rows(self.objective, current));
-        let data = slopes.rows(0, rows.len()).into_owned();
-        let left = left_over(&data, rows);
-        self.prior_weight = spread(self.objective, left.as_slice(), self.free.len());
-        self.begun = Some((self.x.clone(), slopes));
-    }
-
-    /// `slopes` with the rows of the priors as they are weighed now.
-    fn with_priors(&self, mut slopes: DMatrix<f64>) -> DMatrix<f64> {
-        let first = slopes.nrows() - self.free.len();
-        for (j, free) in self.free.iter().enumerate().filter(|(j, _)| !self.fixed[*j]) {
-            slopes[(first + j, j)] = self.prior_weight * free.prior_slope();
-        }
-        slopes
-    }
-
-    fn model_at(&self, x: &DVector<f64>) -> JointModel {
-        let mut model = self.model.clone();
-        for (free, x) in self.free.iter().zip(x.iter()) {
-            free.apply(*x, &mut model);
-        }
-        model
-    }
-
-    fn residuals_at(&self, x: &DVector<f64>) -> Option<Residuals> {
-        self.objective.residuals(&self.model_at(x)).ok().filter(Residuals::is_finite)
-    }
-
-    /// Column `j` of `known`, whose rows end with the priors of its own parameters.
-    fn known_column(&self, known: &DMatrix<f64>, j: usize, rows: usize) -> DVector<f64> {
-        let data = rows - self.free.len();
-        let mut column = known.column(j).rows(0, data).into_owned().resize_vertically(rows, 0.0);
-        column[data + j] = self.prior_weight * self.free[j].prior_slope();
-        column
-    }
-
-    /// Weighted training residuals followed by the priors.
-    fn weighted(&self, residuals: &Residuals, x: &DVector<f64>) -> DVector<f64> {
-        let mut rows = training_rows(self.objective, residuals);
-        let priors = self.free.iter().zip(x.iter());
-        rows.extend(priors.map(|(free, x)| self.prior_weight * free.prior_residual(*x)));
-        DVector::from_vec(rows)
-    }
 }
 
 /// Standard deviation of weighted training residuals, at least 1, what scales say, allowing for how long they stay alike: what two
@@ -124,68 +64,6 @@ pub(crate) fn training_rows(objective: &Objective, residuals: &Residuals) -> Vec
 
 /// Blocks over which the residuals of a real bench stay alike, 0.1 s: the time in which a front crosses a sheath.
 const CORRELATED_BLOCKS: f64 = 2.0;
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, x: &DVector<f64>) {
-        self.x.copy_from(x);
-        self.current = self.residuals_at(x);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.x.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        self.current.as_ref().map(|residuals| self.weighted(residuals, &self.x))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        match &self.begun {
-            Some((x, slopes)) if *x == self.x => Some(self.with_priors(slopes.clone())),
-            _ => self.slopes(),
-        }
-    }
-}
-
-impl Problem<'_> {
-    /// Slopes of the weighted residuals.
-    fn slopes(&self) -> Option<DMatrix<f64>> {
-        let here = self.weighted(self.current.as_ref()?, &self.x);
-        let columns: Option<Vec<DVector<f64>>> = (0..self.free.len())
-            .into_par_iter()
-            .map(|j| {
-                if self.fixed[j] {
-                    return Some(DVector::zeros(here.len()));
-                }
-                let free = &self.free[j];
-                if let Some(known) = self.known.filter(|known| j < known.ncols()) {
-                    return Some(self.known_column(known, j, here.len()));
-                }
-                let at = |step: f64| {
-                    let mut x = self.x.clone();
-                    x[j] += step;
-                    Some(self.weighted(&self.residuals_at(&x)?, &x))
-                };
-                let [before, ahead] =
-                    [-self.step, self.step].map(|step| free.at_bound(free.value_at(self.x[j] + step)));
-                // A step ahead alone takes curvature for slope, and a valley is left half-way: in the rounds that find the place
-                // the quotient is symmetric. So it is where a moment lies too late, which only a step back changes.
-                let symmetric = self.step < COARSE_STEP || free.is_moment();
-                if symmetric && !before && !ahead {
-                    return Some((at(self.step)? - at(-self.step)?) / (2.0 * self.step));
-                }
-                // Step away from the nearer bound.
-                let step = if ahead { -self.step } else { self.step };
-                Some((at(step)? - &here) / step)
-            })
-            .collect();
-        Some(DMatrix::from_columns(&columns?))
-    }
-}
 
 /// Fits the free parameters of `model` to the training part.
 ///
@@ -264,7 +142,7 @@ fn solve_knowing(
     }
     let mut fixed = vec![false; free.len()];
     let prior_weight = known.map_or(1.0, |known| known.spread);
-    let problem_at = |step, fixed: &[bool], x, current| Problem {
+    let problem_at = |step, fixed: &[bool], x, current, begun| Problem {
         objective,
         model,
         free,
@@ -274,31 +152,39 @@ fn solve_knowing(
         known: slopes,
         x,
         current,
-        begun: None,
+        begun,
+        stood: Mutex::new(None),
     };
     let mut x = DVector::zeros(free.len());
     // Residuals at `x`: no round simulates again where the one before it ended.
     let mut current = Some(start).filter(Residuals::is_finite);
+    // Slopes where the round before ended, if they were simulated there, with the step of their quotients.
+    let mut ended: Option<(f64, _)> = None;
+    let found_with =
+        |step, ended: Option<(f64, _)>| ended.filter(|(with, _)| *with == step).map(|(_, begun)| begun);
     for (round, &step) in rounds.iter().enumerate() {
-        let mut problem = problem_at(step, &fixed, x, current);
+        let mut problem = problem_at(step, &fixed, x, current, found_with(step, ended));
         if known.is_none() {
             problem.weigh_priors();
         }
         // Farther than this the difference quotients do not lead.
+        let first_step = problem.first_step(FIRST_STEP);
         let tolerance = if step >= COARSE_STEP { 3e-3 } else { 5e-4 };
         let optimiser = LevenbergMarquardt::new()
             .with_patience(patience)
-            .with_stepbound(0.5)
+            .with_stepbound(first_step)
             .with_ftol(tolerance)
             .with_xtol(3.0 * tolerance)
             .with_gtol(1e-6);
         let (problem, _report) = optimiser.minimize(problem);
+        ended = problem.simulated_slopes().map(|begun| (step, begun));
         (x, current) = (problem.x, problem.current);
         let mut newly = false;
         for (j, free) in free.iter().enumerate() {
             if !fixed[j] && free.at_bound(free.value_at(x[j])) {
                 fixed[j] = true;
                 newly = true;
+                ended = None;
             }
         }
         let repeated = round > 0 && rounds[round - 1] == step;
@@ -306,7 +192,7 @@ fn solve_knowing(
             break;
         }
     }
-    let mut problem = problem_at(FINE_STEP, &fixed, x, current);
+    let mut problem = problem_at(FINE_STEP, &fixed, x, current, found_with(FINE_STEP, ended));
     let values: Vec<f64> = free.iter().zip(problem.x.iter()).map(|(free, x)| free.value_at(*x)).collect();
     let model = problem.model_at(&problem.x);
     let (jacobian, stds) = if known.is_some() {
