@@ -73,6 +73,8 @@ pub struct ParameterSpec {
     pub meaning: &'static str,
     /// Whether a search for missing physics fits it; otherwise it keeps what the file or the default says.
     pub searched: bool,
+    /// Values that a search tries one by one, each as a hypothesis of its own; empty for all others.
+    pub forms: &'static [f64],
 }
 
 impl ParameterSpec {
@@ -85,7 +87,7 @@ impl ParameterSpec {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        Self { name, unit, lower, upper, default, scale: Scale::Linear, meaning, searched: true }
+        Self { name, unit, lower, upper, default, scale: Scale::Linear, meaning, searched: true, forms: &[] }
     }
 
     /// Positive parameter whose steps are ratios.
@@ -97,13 +99,21 @@ impl ParameterSpec {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        Self { name, unit, lower, upper, default, scale: Scale::Log, meaning, searched: true }
+        Self { name, unit, lower, upper, default, scale: Scale::Log, meaning, searched: true, forms: &[] }
     }
 
     /// The same parameter, left alone by a search for missing physics.
     #[must_use]
     pub const fn not_searched(mut self) -> Self {
         self.searched = false;
+        self
+    }
+
+    /// The same parameter, of which a search for missing physics tries each of these values and fits none.
+    #[must_use]
+    pub const fn one_of(mut self, forms: &'static [f64]) -> Self {
+        self.searched = false;
+        self.forms = forms;
         self
     }
 }

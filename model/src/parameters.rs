@@ -155,6 +155,7 @@ macro_rules! nominal {
                 scale: Scale::$scale,
                 meaning: $meaning,
                 searched: true,
+                forms: &[],
             },
             get: |joint| joint.$section.map(|part| part.$name),
             slot: |joint| joint.$section.as_mut().map(|part| &mut part.$name),

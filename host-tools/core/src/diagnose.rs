@@ -34,6 +34,7 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::law;
 
+use crate::fit::free::Free;
 use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::variation::Variation;
@@ -332,7 +333,7 @@ impl Case<'_> {
         let mut laws = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
             let active = last.model.effects[own + index];
-            let count = active.descriptor().parameters.iter().filter(|spec| spec.searched).count();
+            let count = Free::of_effect(&last.model, own + index).len();
             let values = first_value..first_value + count;
             first_value += Layout::of_found(&last.model, own + index).len();
             if let Some(law) = law::of(&active) {
@@ -441,15 +442,17 @@ fn named(
     let descriptor = active.descriptor();
     let improvement = 1.0 - chosen.loss_after / chosen.loss_before;
     let (probability, rivals) = words::rivals(chosen, improvement, separate);
+    let mut stds = stds.iter();
     let parameters = descriptor
         .parameters
         .iter()
         .zip(active.parameters)
-        .filter(|(spec, _)| spec.searched)
-        .zip(stds)
-        .map(|((spec, value), std)| {
-            let at_bound = value <= spec.lower || value >= spec.upper;
-            (spec.name.to_owned(), Estimate { value, std: *std, unit: spec.unit.to_owned(), at_bound })
+        .filter_map(|(spec, value)| {
+            let fitted = spec.searched;
+            let std = if fitted { *stds.next()? } else { None };
+            let at_bound = fitted && (value <= spec.lower || value >= spec.upper);
+            let estimate = Estimate { value, std, unit: spec.unit.to_owned(), at_bound };
+            (fitted || !spec.forms.is_empty()).then(|| (spec.name.to_owned(), estimate))
         })
         .collect();
     let onset_s = descriptor

@@ -22,7 +22,8 @@ static DESCRIPTOR: Descriptor = Descriptor {
             0.1,
             "friction torque per torque carried (at 1 N·m where the exponent is not 1)",
         ),
-        ParameterSpec::linear("exponent", "1", [1.0, 3.0], 1.0, "power of the torque carried").not_searched(),
+        ParameterSpec::linear("exponent", "1", [1.0, 3.0], 1.0, "power of the torque carried")
+            .one_of(&[1.0, 2.0]),
     ],
     neutral: Some(0.0),
     channels: &[],

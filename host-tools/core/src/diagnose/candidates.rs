@@ -28,7 +28,8 @@ const REST_RAD: f64 = 0.05;
 /// One effect and where to start.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The effect at its starting points; a sensor's effect stands once for every channel it may be on.
+    /// The effect at its starting points; a sensor's effect stands once for every channel it may be on, one that has several forms
+    /// once for each.
     pub starts: Vec<ActiveEffect>,
 }
 
@@ -60,14 +61,24 @@ pub fn candidates(
             if contained {
                 continue;
             }
-            let base = ActiveEffect { target, ..sized(model, effect) };
-            let starts = starts(base, model, objective, predictions);
-            if !starts.is_empty() {
-                found.push(Candidate { starts });
+            for base in forms(ActiveEffect { target, ..sized(model, effect) }) {
+                let starts = starts(base, model, objective, predictions);
+                if !starts.is_empty() {
+                    found.push(Candidate { starts });
+                }
             }
         }
     }
     found
+}
+
+/// The effect once for each form that one of its parameters may have.
+fn forms(base: ActiveEffect) -> Vec<ActiveEffect> {
+    let formed = base.descriptor().parameters.iter().find(|spec| !spec.forms.is_empty());
+    formed.map_or_else(
+        || vec![base],
+        |spec| spec.forms.iter().map(|form| base.with(spec.name, *form)).collect(),
+    )
 }
 
 pub(super) fn fits(model: &JointModel, component: Component) -> bool {
@@ -304,6 +315,16 @@ mod tests {
         for (a, b) in paper.iter().zip(&finger) {
             assert!((b.parameters[0] / a.parameters[0] - 0.1).abs() < 1e-9, "{b:?} for {a:?}");
         }
+    }
+
+    /// Each form stands by itself: the two are fitted and compared like two effects.
+    #[test]
+    fn friction_of_a_gear_is_looked_for_in_proportion_to_the_load_and_to_its_square() {
+        let starts = tried("gear_load_friction", |model| model);
+        let exponents: Vec<f64> = starts.iter().map(|start| start.parameters[1]).collect();
+        assert_eq!(exponents, [[1.0; STEADY.len()], [2.0; STEADY.len()]].concat());
+        assert_eq!(forms(starts[0]).len(), 2);
+        assert_eq!(forms(ActiveEffect::with_defaults(find("joint_spring").unwrap())).len(), 1);
     }
 
     #[test]

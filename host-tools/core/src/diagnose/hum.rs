@@ -103,15 +103,15 @@ const fn channel_of(series: Series) -> Option<Channel> {
     }
 }
 
-/// Samples of one block of a channel.
-struct Samples {
+/// BlockSamples of one block of a channel.
+struct BlockSamples {
     first: usize,
     clock_s: Vec<f64>,
     /// What is left, about its mean: what is slower than a block is no hum.
     left: Vec<f64>,
 }
 
-impl Samples {
+impl BlockSamples {
     /// Those of one recording that belong to `part`, block by block.
     fn of(
         objective: &Objective,
@@ -171,9 +171,14 @@ fn line(
     channels: usize,
 ) -> Option<Line> {
     let recordings = 0..objective.recordings();
-    let of = |recording, part| Samples::of(objective, predictions, channel, (recording, part));
-    let count = |samples: &[Samples]| samples.iter().map(|block| block.left.len()).sum::<usize>();
-    let longest = recordings.clone().max_by_key(|recording| count(&of(*recording, Part::Training)))?;
+    let of = |recording, part| BlockSamples::of(objective, predictions, channel, (recording, part));
+    let count = |samples: &[BlockSamples]| samples.iter().map(|block| block.left.len()).sum::<usize>();
+    let trained = |recording: &usize| -> usize {
+        let blocks = objective.blocks(*recording).iter().filter(|block| block.part == Part::Training);
+        blocks.map(|block| block.end - block.start).sum()
+    };
+    let measured = |recording: &usize| objective.measured(*recording, Series::Channel(channel)).is_some();
+    let longest = recordings.clone().filter(measured).max_by_key(trained)?;
     let fitted_to = of(longest, Part::Training);
     let t_s = objective.input(longest).t_s();
     let span_s = t_s[t_s.len() - 1] - t_s[0];
@@ -187,9 +192,10 @@ fn line(
     let beside = TAU / span_s;
     let rate = best_rate(&table, (TAU * rough_hz - beside, TAU * rough_hz + beside), 0.1 * beside)?;
     let amplitudes = fitted(&fitted_to, rate)?;
-    let judged: Vec<Samples> = recordings.flat_map(|recording| of(recording, Part::HeldOut)).collect();
-    let left = |blocks: &[Samples]| mean_square(blocks.iter().flat_map(|block| &block.left).copied());
-    let rest = |blocks: &[Samples]| mean_square(blocks.iter().flat_map(|block| block.rest(rate, amplitudes)));
+    let judged: Vec<BlockSamples> = recordings.flat_map(|recording| of(recording, Part::HeldOut)).collect();
+    let left = |blocks: &[BlockSamples]| mean_square(blocks.iter().flat_map(|block| &block.left).copied());
+    let rest =
+        |blocks: &[BlockSamples]| mean_square(blocks.iter().flat_map(|block| block.rest(rate, amplitudes)));
     Some(Line {
         channel,
         frequency_hz: rate / TAU,
@@ -203,7 +209,7 @@ fn line(
 
 /// Frequency of the highest line above [`LOWEST_HZ`], if noise alone hardly makes one so high: the power of white noise is distributed
 /// exponentially about its mean, so that the highest of `n` exceeds `x` times the mean with a chance of `n exp(-x)`.
-fn peak_hz(blocks: &[Samples], samples: usize, rate_hz: f64, channels: usize) -> Option<f64> {
+fn peak_hz(blocks: &[BlockSamples], samples: usize, rate_hz: f64, channels: usize) -> Option<f64> {
     if samples < 4 * FLOOR_BINS {
         return None;
     }
@@ -229,7 +235,7 @@ fn peak_hz(blocks: &[Samples], samples: usize, rate_hz: f64, channels: usize) ->
 }
 
 /// Amplitudes of sine and cosine that take most off the samples.
-fn fitted(blocks: &[Samples], rate: f64) -> Option<[f64; 2]> {
+fn fitted(blocks: &[BlockSamples], rate: f64) -> Option<[f64; 2]> {
     let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for block in blocks {
         for ((sin, cos), left) in block.waves(rate).zip(&block.left) {

@@ -6,7 +6,7 @@ mod trying;
 
 use std::cmp::Ordering;
 
-use bowden_model::effect::ActiveEffect;
+use bowden_model::effect::{ActiveEffect, ParameterSpec};
 use bowden_model::law;
 use rayon::prelude::*;
 
@@ -232,9 +232,15 @@ impl Fitted {
         self.layout.without_ordinary(&self.solution.model)
     }
 
-    /// Held-out loss with the advantage that simpler effects get.
+    /// Held-out loss with the advantage that simpler effects get. A form that is not the usual one must be worth its choice as a name
+    /// must.
     fn handicapped(&self) -> f64 {
-        self.loss * (1.0 + LOSS_PER_PARAMETER * self.newest().descriptor().parameters.len() as f64)
+        let newest = self.newest();
+        let parameters = newest.descriptor().parameters;
+        let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
+        let share =
+            if parameters.iter().zip(newest.parameters).any(unusual) { WORTHWHILE_SHARE } else { 0.0 };
+        self.loss * (1.0 + LOSS_PER_PARAMETER * parameters.len() as f64) / (1.0 - share)
     }
 
     fn best_first(&self, other: &Self) -> Ordering {

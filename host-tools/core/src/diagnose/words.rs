@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use bowden_model::effect::{ActiveEffect, Component};
+use bowden_model::effect::{ActiveEffect, Component, ParameterSpec};
 
 use super::selection::{Chosen, Tried};
 use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
@@ -99,8 +99,8 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
     if let Some(channel) = active.target.name() {
         let _ = write!(text, " ({channel})");
     }
-    let searched = descriptor.parameters.iter().zip(active.parameters).filter(|(spec, _)| spec.searched);
-    for (spec, value) in searched.take(2) {
+    let told = |(spec, value): &(&ParameterSpec, f64)| spec.searched || *value != spec.default;
+    for (spec, value) in descriptor.parameters.iter().zip(active.parameters).filter(told).take(2) {
         let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
         let name = spec.meaning;
         if spec.name.ends_with("time_s") || spec.name == "start_s" {
