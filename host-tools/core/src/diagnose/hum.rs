@@ -103,7 +103,7 @@ const fn channel_of(series: Series) -> Option<Channel> {
     }
 }
 
-/// BlockSamples of one block of a channel.
+/// Samples of one block of a channel.
 struct BlockSamples {
     first: usize,
     clock_s: Vec<f64>,
