@@ -6,6 +6,7 @@
 
 use crate::channel::Channel;
 use crate::friction_law::FrictionLaw;
+use crate::search::{Aftermath, Starts, is_weak};
 
 /// Largest number of parameters that one effect may have.
 pub const MAX_PARAMETERS: usize = 6;
@@ -310,6 +311,45 @@ pub trait Effect: Sync {
     /// that a diagnosis may use unasked.
     fn on_request(&self) -> bool {
         false
+    }
+
+    /// Where a search for it starts from.
+    fn starts(&self) -> Starts {
+        Starts::Usual
+    }
+
+    /// Whether a search looks for it on `channel`; `drives` says that the channel drives the replay, which shows such an effect only in what
+    /// follows from it.
+    fn is_looked_for_on(&self, channel: Channel, drives: bool) -> bool {
+        let _ = channel;
+        !drives
+    }
+
+    /// Whether one converter may give it to all tensions at once.
+    fn is_shared_by_tensions(&self) -> bool {
+        false
+    }
+
+    /// Whether so little of it is there that it is not worth a name; `usual` is the strength that a bench of this size typically shows.
+    fn is_hardly_there(&self, parameters: &[f64; MAX_PARAMETERS], usual: f64) -> bool {
+        self.descriptor().neutral.is_some_and(|neutral| is_weak(parameters[0], neutral, usual))
+    }
+
+    /// What to record so that it shows apart from others; `None` where what does so for its component is enough.
+    fn told_apart_by(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Moves the parameters to what they are `clock_s` seconds after the begin of the recordings, and says what else is left. What happened at
+    /// a moment has happened.
+    fn after(&self, parameters: &mut [f64; MAX_PARAMETERS], clock_s: f64) -> Aftermath {
+        let _ = clock_s;
+        for (spec, value) in self.descriptor().parameters.iter().zip(parameters) {
+            if spec.name == "time_s" {
+                *value = 0.0;
+            }
+        }
+        Aftermath::NONE
     }
 
     /// Law of sheath friction that replaces the rig's when the simulation is set up.

@@ -18,10 +18,16 @@
 mod form;
 mod list;
 
+use core::f64::consts::TAU;
+
+use libm::{exp, round};
+
 use crate::effect::{
     ActiveEffect, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, MotorPort, SensorPort,
     TransmissionPort,
 };
+
+use crate::search::Aftermath;
 
 pub use form::Form;
 pub use list::LAWS;
@@ -177,6 +183,38 @@ impl Effect for Law {
     /// The list of names that a diagnosis may use unasked is fixed.
     fn on_request(&self) -> bool {
         true
+    }
+
+    /// How large a law usually is nobody knows; the loss alone decides.
+    fn is_hardly_there(&self, _p: &[f64; MAX_PARAMETERS], _usual: f64) -> bool {
+        false
+    }
+
+    /// What sets in has partly done so, and a swing has run on.
+    fn after(&self, p: &mut [f64; MAX_PARAMETERS], clock_s: f64) -> Aftermath {
+        let set_in = |[amplitude, time_constant_s, ..]: [f64; MAX_PARAMETERS]| {
+            let to_come = amplitude * exp(-clock_s / time_constant_s);
+            (amplitude - to_come, to_come)
+        };
+        match (self.form, self.port) {
+            (Form::Decay, Port::Reading) => {
+                let (offset, to_come) = set_in(*p);
+                p[0] = to_come;
+                Aftermath { offset, ..Aftermath::NONE }
+            }
+            (Form::Decay, Port::SheathFriction) => {
+                let (done, to_come) = set_in(*p);
+                let friction_factor = (1.0 + done).max(0.0);
+                p[0] = to_come / friction_factor.max(1e-3);
+                Aftermath { friction_factor, ..Aftermath::NONE }
+            }
+            (Form::Oscillation, _) => {
+                let phase_rad = p[2] + TAU * p[1] * clock_s;
+                p[2] = phase_rad - TAU * round(phase_rad / TAU);
+                Aftermath::NONE
+            }
+            _ => Aftermath::NONE,
+        }
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut MotorPort) {

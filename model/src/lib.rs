@@ -13,5 +13,6 @@ pub mod load;
 pub mod paper;
 pub mod parameters;
 pub mod plant;
+pub mod search;
 pub mod sheath;
 pub mod transmission;

@@ -27,6 +27,10 @@ impl Effect for AsymmetricFriction {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("slow triangles with the weight pulling on cable a, then on cable b")
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for (tendon, sign) in port.tendons.iter_mut().zip([1.0, -1.0]) {
             for law in &mut tendon.slip {

@@ -1,7 +1,10 @@
 //! An encoder disc off its axis: shown `θ + A sin(θ + φ) - A sin φ`.
 
+use core::f64::consts::PI;
+
 use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+use crate::search::Starts;
 use libm::sin;
 
 /// An encoder disc off its axis: shown `θ + A sin(θ + φ) - A sin φ`.
@@ -26,6 +29,16 @@ fn error_rad(p: &[f64; MAX_PARAMETERS], theta_rad: f64) -> f64 {
 impl Effect for EncoderEccentricity {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// The other two quarters are these with the other sign.
+    fn starts(&self) -> Starts {
+        Starts::At("phase_rad", &[0.01 - PI, 0.01 - PI / 2.0])
+    }
+
+    /// What it makes of an angle that drives the replay shows in what follows from it.
+    fn is_looked_for_on(&self, _channel: Channel, _drives: bool) -> bool {
+        true
     }
 
     fn measure(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {

@@ -1,6 +1,7 @@
 //! The arm touches a stop: `τ = -k max(s (θ - θ_stop), 0) s`, with the side `s` given by the sign of the stop angle.
 
 use crate::effect::{Component, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, ParameterSpec};
+use crate::search::Starts;
 
 /// The arm touches a stop: `τ = -k max(s (θ - θ_stop), 0) s`, with the side `s` given by the sign of the stop angle.
 pub struct EndStopContact;
@@ -26,6 +27,10 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for EndStopContact {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::EndsOfTravel
     }
 
     fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {

@@ -3,6 +3,7 @@
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
 };
+use crate::search::Aftermath;
 
 /// Sheath friction that changes steadily: `μ(t) = μ (1 + ρ t)`.
 pub struct FrictionDrift;
@@ -25,6 +26,13 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for FrictionDrift {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// It goes on from where it is; what falls on by the same amount is a larger share of what is left.
+    fn after(&self, p: &mut [f64; MAX_PARAMETERS], clock_s: f64) -> Aftermath {
+        let friction_factor = (1.0 + p[0] * clock_s).max(0.0);
+        p[0] /= friction_factor.max(1e-3);
+        Aftermath { friction_factor, ..Aftermath::NONE }
     }
 
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {

@@ -1,6 +1,7 @@
 //! Play between rotor and input pulley: no torque passes inside the gap.
 
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+use crate::search::Starts;
 
 /// Play between rotor and input pulley: no torque passes inside the gap.
 pub struct GearBacklash;
@@ -26,6 +27,15 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for GearBacklash {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// A simulation with a fifth more or less play than there is predicts no better than one without.
+    fn starts(&self) -> Starts {
+        Starts::ThirdsOfOctaves
+    }
+
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("slow small triangles about the hanging position, where the torque changes sign")
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {

@@ -34,6 +34,10 @@ impl Effect for GearLoadFriction {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("the same slow triangle with the arm unloaded and with full weight")
+    }
+
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         let [coefficient, exponent, ..] = *p;
         port.coulomb_nm += coefficient

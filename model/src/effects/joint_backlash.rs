@@ -19,6 +19,10 @@ impl Effect for JointBacklash {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("slow small triangles about the hanging position, where the torque changes sign")
+    }
+
     fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {
         port.play_rad += p[0];
     }

@@ -1,6 +1,10 @@
 //! A spring pulls the joint towards an angle: `τ = -k (θ - θ_0)`, as of a cable harness.
 
 use crate::effect::{Component, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, ParameterSpec};
+use crate::search::Starts;
+
+/// Angle of rest at which a spring is looked for, either side of zero.
+const REST_RAD: f64 = 0.05;
 
 /// A spring pulls the joint towards an angle: `τ = -k (θ - θ_0)`, as of a cable harness.
 pub struct JointSpring;
@@ -20,6 +24,15 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for JointSpring {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// Where a harness is at rest it is some degrees off; the torque of that is as much a sign of it as the slope.
+    fn starts(&self) -> Starts {
+        Starts::StrengthsAt("rest_rad", &[-REST_RAD, 0.0, REST_RAD])
+    }
+
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("holding at five poses across the whole range for two seconds each")
     }
 
     fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {

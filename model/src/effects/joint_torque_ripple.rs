@@ -1,6 +1,8 @@
 //! Torque on the joint that is locked to its angle: `τ = A sin(n θ + φ)`, as of balls that have dented the race of a bearing.
 
+use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, ParameterSpec};
+use crate::search::Starts;
 use libm::sin;
 
 /// Torque on the joint that is locked to its angle: `τ = A sin(n θ + φ)`.
@@ -22,6 +24,10 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for JointTorqueRipple {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::LockedTo(Channel::ThetaOut)
     }
 
     fn on_request(&self) -> bool {

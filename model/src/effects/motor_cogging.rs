@@ -1,6 +1,8 @@
 //! Torque ripple locked to the rotor position: `τ = A sin(n θ + φ)`.
 
+use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+use crate::search::Starts;
 use libm::sin;
 
 /// Torque ripple locked to the rotor position: `τ = A sin(n θ + φ)`.
@@ -28,6 +30,14 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for MotorCogging {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::LockedTo(Channel::ThetaIn)
+    }
+
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("one slow turn at constant speed in each direction with the tendons at low pretension")
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {

@@ -30,6 +30,10 @@ impl Effect for MotorCoulombFriction {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded")
+    }
+
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         port.coulomb_nm += p[0];
         port.presliding_rad = p[1];

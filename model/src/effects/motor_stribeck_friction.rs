@@ -1,6 +1,7 @@
 //! Dry friction of motor and gear that falls with speed: `τ = τ_c + τ_s e^{-(ω/ω_s)²}`.
 
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+use crate::search::NAMED_STRENGTH;
 use libm::exp;
 
 /// Dry friction of motor and gear that falls with speed: `τ = τ_c + τ_s e^{-(ω/ω_s)²}`.
@@ -34,6 +35,15 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for MotorStribeckFriction {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// Friction that hardly falls with speed is dry friction, which has a name of its own.
+    fn is_hardly_there(&self, p: &[f64; MAX_PARAMETERS], usual: f64) -> bool {
+        p[0] < (0.3 * p[2]).max(NAMED_STRENGTH * usual)
+    }
+
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded")
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {

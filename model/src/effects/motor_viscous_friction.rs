@@ -25,6 +25,10 @@ impl Effect for MotorViscousFriction {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded")
+    }
+
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         port.torque_nm -= p[0] * port.omega_rad_s;
     }

@@ -25,6 +25,10 @@ impl Effect for PayloadChange {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("holding at five poses across the whole range for two seconds each")
+    }
+
     fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {
         let share = ((port.t_s - p[1]) / HANDLING_TIME_S + 0.5).clamp(0.0, 1.0);
         port.mass_kg = (port.mass_kg + p[0] * share).max(0.0);

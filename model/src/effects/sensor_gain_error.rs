@@ -2,6 +2,7 @@
 
 use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+use crate::search::Starts;
 
 /// A sensor with a wrong scale: shown `g x`.
 pub struct SensorGainError;
@@ -18,6 +19,15 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for SensorGainError {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::At("gain", &[0.92, 1.08])
+    }
+
+    /// An encoder counts; where angles do not fit each other by a factor, that is the pulleys' ratio, which is recalibrated.
+    fn is_looked_for_on(&self, channel: Channel, drives: bool) -> bool {
+        !drives && !channel.is_angle()
     }
 
     fn measure(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {

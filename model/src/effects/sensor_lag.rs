@@ -2,6 +2,7 @@
 
 use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+use crate::search::Starts;
 use libm::expm1;
 
 /// A sensor behind a first-order filter: `τ dy/dt = x - y`.
@@ -25,6 +26,14 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for SensorLag {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::At("time_constant_s", &[0.01, 0.05])
+    }
+
+    fn is_shared_by_tensions(&self) -> bool {
+        true
     }
 
     fn measure(&self, p: &[f64; MAX_PARAMETERS], s: &mut EffectState, port: &mut SensorPort) {

@@ -2,6 +2,7 @@
 
 use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+use crate::search::Starts;
 
 /// A sensor with a wrong zero: shown `x + o`.
 pub struct SensorOffset;
@@ -24,6 +25,15 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for SensorOffset {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::MeanDifference
+    }
+
+    /// What is usual depends on the channel.
+    fn is_hardly_there(&self, _p: &[f64; MAX_PARAMETERS], _usual: f64) -> bool {
+        false
     }
 
     fn measure(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {

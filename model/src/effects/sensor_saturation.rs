@@ -2,6 +2,7 @@
 
 use crate::channel::Channel;
 use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, SensorPort};
+use crate::search::Starts;
 
 /// A sensor that stops at a limit: shown `min(x, limit)`.
 pub struct SensorSaturation;
@@ -24,6 +25,10 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for SensorSaturation {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::LargestShown
     }
 
     fn measure(&self, p: &[f64; MAX_PARAMETERS], _s: &mut EffectState, port: &mut SensorPort) {

@@ -27,6 +27,10 @@ impl Effect for SheathViscousFriction {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("triangles of equal amplitude at five speeds over two decades")
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for tendon in &mut port.tendons {
             let wrap_angle_rad = tendon.wrap_angle_rad.max(1e-3);

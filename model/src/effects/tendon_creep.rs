@@ -5,6 +5,7 @@
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
 };
+use crate::search::Aftermath;
 use libm::exp;
 
 /// Slow stretch under load: `τ dx/dt = ρ T / k - x` with end-to-end stiffness `k`.
@@ -33,6 +34,11 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for TendonCreep {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn after(&self, p: &mut [f64; MAX_PARAMETERS], clock_s: f64) -> Aftermath {
+        p[2] += clock_s;
+        Aftermath::NONE
     }
 
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], s: &mut EffectState, port: &mut TransmissionPort) {

@@ -27,6 +27,10 @@ impl Effect for TransmissionBacklash {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("slow small triangles about the hanging position, where the torque changes sign")
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         port.play_rad += p[0];
     }

@@ -1,6 +1,7 @@
 //! Winding resistance that rises with dissipated power: `R = R_0 (1 + x)`, `τ dx/dt = g i² R - x`.
 
 use crate::effect::{Component, Descriptor, DrivePort, Effect, EffectState, MAX_PARAMETERS, ParameterSpec};
+use crate::search::Starts;
 
 /// Winding resistance that rises with dissipated power: `R = R_0 (1 + x)`, `τ dx/dt = g i² R - x`.
 pub struct WindingHeating;
@@ -26,6 +27,10 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for WindingHeating {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    fn starts(&self) -> Starts {
+        Starts::HeatByPower
     }
 
     fn drive(&self, p: &[f64; MAX_PARAMETERS], s: &mut EffectState, port: &mut DrivePort) {

@@ -3,6 +3,7 @@
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
 };
+use crate::search::Aftermath;
 
 /// Somebody moves the sheaths for a while: `K` changes by `ΔK` from `t_0` to `t_0 + T`, with ramps of a tenth of `T`.
 pub struct WrapAngleDisturbed;
@@ -23,6 +24,12 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for WrapAngleDisturbed {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// A disturbance that has ended is gone.
+    fn after(&self, p: &mut [f64; MAX_PARAMETERS], clock_s: f64) -> Aftermath {
+        let [_, start_s, duration_s, ..] = *p;
+        if start_s + duration_s < clock_s { Aftermath::GONE } else { Aftermath::NONE }
     }
 
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {

@@ -27,6 +27,10 @@ impl Effect for WrapAngleVariesWithPose {
         &DESCRIPTOR
     }
 
+    fn told_apart_by(&self) -> Option<&'static str> {
+        Some("small slow triangles at five poses across the whole range")
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for tendon in &mut port.tendons {
             tendon.wrap_angle_rad = (tendon.wrap_angle_rad + p[0] * port.theta_out_rad).max(0.0);

@@ -1,11 +1,8 @@
 //! The bench after its recordings: what happened at a moment has happened, what has passed is gone, and creep and drift go
 //! on from where they are.
 
-use std::f64::consts::TAU;
-
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects;
-use bowden_model::law::{self, Form};
 
 use crate::joint_model::JointModel;
 
@@ -14,40 +11,17 @@ pub(super) fn afterwards(model: &JointModel, own: usize, clock_s: f64) -> JointM
     let mut now = model.clone();
     let found = now.effects.split_off(own);
     for effect in found {
-        match effect.descriptor().id {
-            "wrap_angle_disturbed" if effect.parameters[1] + effect.parameters[2] < clock_s => {}
-            "friction_drift" => {
-                let drifted = (1.0 + effect.parameters[0] * clock_s).max(0.0);
-                if let Some(sheath) = &mut now.parameters.sheath {
-                    sheath.friction_coefficient *= drifted;
-                }
-                now.effects.push(effect.with("rate_per_s", effect.parameters[0] / drifted.max(1e-3)));
-            }
-            "law_sheath_friction_sets_in" => {
-                let [amplitude, time_constant_s, ..] = effect.parameters;
-                let to_come = amplitude * (-clock_s / time_constant_s).exp();
-                let factor = (1.0 + amplitude - to_come).max(0.0);
-                if let Some(sheath) = &mut now.parameters.sheath {
-                    sheath.friction_coefficient *= factor;
-                }
-                now.effects.push(effect.with("amplitude", to_come / factor.max(1e-3)));
-            }
-            "law_reading_sets_in" => {
-                let [amplitude, time_constant_s, ..] = effect.parameters;
-                let to_come = amplitude * (-clock_s / time_constant_s).exp();
-                let offset = effects::find("sensor_offset").map(ActiveEffect::with_defaults);
-                let offset = offset.map(|offset| offset.with("offset", amplitude - to_come));
-                now.effects.extend(offset.map(|offset| ActiveEffect { target: effect.target, ..offset }));
-                now.effects.push(effect.with("amplitude", to_come));
-            }
-            _ if law::of(&effect).is_some_and(|law| law.form() == Form::Oscillation) => {
-                let [_, frequency_hz, phase_rad, ..] = effect.parameters;
-                let phase_rad = phase_rad + TAU * frequency_hz * clock_s;
-                now.effects.push(effect.with("phase_rad", phase_rad - TAU * (phase_rad / TAU).round()));
-            }
-            "tendon_creep" => now.effects.push(effect.with("age_s", effect.parameters[2] + clock_s)),
-            _ => now.effects.push(effect.with("time_s", 0.0)),
+        let mut aged = effect;
+        let left = effect.effect.after(&mut aged.parameters, clock_s);
+        if let Some(sheath) = &mut now.parameters.sheath {
+            sheath.friction_coefficient *= left.friction_factor;
         }
+        if left.offset != 0.0 {
+            let offset = effects::find("sensor_offset").map(ActiveEffect::with_defaults);
+            let offset = offset.map(|offset| offset.with("offset", left.offset));
+            now.effects.extend(offset.map(|offset| ActiveEffect { target: effect.target, ..offset }));
+        }
+        now.effects.extend(left.goes_on.then_some(aged));
     }
     now
 }

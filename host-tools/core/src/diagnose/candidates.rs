@@ -1,13 +1,12 @@
 //! What could be missing: every effect of the catalogue, each with the starting points from which its parameters are
 //! looked for.
 
-use std::f64::consts::TAU;
-
 use bowden_model::channel::Channel;
-use bowden_model::effect::{ActiveEffect, Component, Descriptor, ParameterSpec, Target};
+use bowden_model::effect::{ActiveEffect, Component, Effect, ParameterSpec, Target};
 use bowden_model::effects::CATALOGUE;
+use bowden_model::search::Starts;
 
-use super::locked::{cogging_start, ripple_start};
+use super::locked::locked_start;
 use crate::fit::objective::{Objective, Series};
 use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
@@ -21,9 +20,6 @@ const STEADY: [f64; 3] = [0.4, 1.0, 2.5];
 
 /// Relative rises of a winding's resistance at which its heating is tried.
 const RISES: [f64; 3] = [0.05, 0.15, 0.45];
-
-/// Angle of rest at which a spring of the joint is tried, either side of zero.
-const REST_RAD: f64 = 0.05;
 
 /// One effect and where to start.
 #[derive(Clone, Debug)]
@@ -53,7 +49,7 @@ pub fn candidates(
         if unasked || redundant || !fits(model, descriptor.component) {
             continue;
         }
-        for target in targets(model, descriptor) {
+        for target in targets(model, effect) {
             let contained = model.effects.iter().any(|active| {
                 active.descriptor().id == descriptor.id
                     && (target == Target::None || overlaps(active.target, target))
@@ -94,22 +90,19 @@ pub(super) fn overlaps(a: Target, b: Target) -> bool {
     Channel::ALL.into_iter().any(|channel| a.includes(channel) && b.includes(channel))
 }
 
-pub(super) fn targets(model: &JointModel, descriptor: &Descriptor) -> Vec<Target> {
-    if descriptor.channels.is_empty() {
+pub(super) fn targets(model: &JointModel, effect: &dyn Effect) -> Vec<Target> {
+    let channels = effect.descriptor().channels;
+    if channels.is_empty() {
         return vec![Target::None];
     }
-    let simulated = |channel: &Channel| {
-        // What an eccentric encoder makes of an angle that drives the replay shows in what follows from it.
-        let invertible = descriptor.id == "encoder_eccentricity";
-        // An encoder counts; where angles do not fit each other by a factor, that is the pulleys' ratio, which is recalibrated.
-        let cannot_be = descriptor.id == "sensor_gain_error" && channel.is_angle();
-        !cannot_be && (model.outputs.contains(channel) || (invertible && model.inputs.contains(channel)))
+    let simulated = |channel: &Channel| model.outputs.contains(channel);
+    let drives = |channel: &Channel| !simulated(channel) && model.inputs.contains(channel);
+    let looked_for = |channel: &&Channel| {
+        (simulated(channel) || drives(channel)) && effect.is_looked_for_on(**channel, drives(channel))
     };
-    let mut targets: Vec<Target> =
-        descriptor.channels.iter().filter(|c| simulated(c)).map(|c| Target::One(*c)).collect();
-    let all_tensions =
-        Channel::TENSIONS.iter().all(|c| descriptor.channels.contains(c) && model.outputs.contains(c));
-    if all_tensions && descriptor.id == "sensor_lag" {
+    let mut targets: Vec<Target> = channels.iter().filter(looked_for).map(|c| Target::One(*c)).collect();
+    let all_tensions = Channel::TENSIONS.iter().all(|c| channels.contains(c) && simulated(c));
+    if all_tensions && effect.is_shared_by_tensions() {
         targets.push(Target::Tensions);
     }
     targets
@@ -121,52 +114,47 @@ fn starts(
     objective: &Objective,
     predictions: &[Prediction],
 ) -> Vec<ActiveEffect> {
-    let parameters = base.descriptor().parameters;
-    let strength = parameters.first();
-    let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
-    match base.descriptor().id {
-        "motor_cogging" => cogging_start(base, objective, predictions).into_iter().collect(),
-        "joint_torque_ripple" => ripple_start(base, model, objective, predictions).into_iter().collect(),
-        "winding_heating" => {
+    let strengths = |base: ActiveEffect| STEADY.map(|factor| with_strength(base, from_neutral(base, factor)));
+    match base.effect.starts() {
+        Starts::Usual => usual_starts(base, objective),
+        Starts::ThirdsOfOctaves => (-6..=6)
+            .map(|third| with_strength(base, base.parameters[0] * (f64::from(third) / 3.0).exp2()))
+            .collect(),
+        Starts::At(name, values) => values.iter().map(|value| base.with(name, *value)).collect(),
+        Starts::StrengthsAt(name, values) => {
+            values.iter().flat_map(|value| strengths(base.with(name, *value))).collect()
+        }
+        Starts::LockedTo(angle) => {
+            locked_start(base, angle, model, objective, predictions).into_iter().collect()
+        }
+        Starts::HeatByPower => {
             let currents =
                 predictions.iter().filter_map(|prediction| prediction.channel(Channel::MotorCurrent));
             heating_starts(base, model, currents.flatten().copied())
         }
-        "sensor_offset" => offset_start(base, objective, predictions).into_iter().collect(),
-        "sensor_saturation" => saturation_start(base, objective).into_iter().collect(),
-        "end_stop_contact" => end_stop_starts(base, model, objective),
-        // A simulation with a fifth more or less play than there is predicts no better than one without.
-        "gear_backlash" => (-6..=6)
-            .map(|third| with_strength(base, base.parameters[0] * (f64::from(third) / 3.0).exp2()))
-            .collect(),
-        // Where a harness is at rest it is some degrees off; the torque of that is as much a sign of it as the slope.
-        "joint_spring" => [-REST_RAD, 0.0, REST_RAD]
-            .into_iter()
-            .flat_map(|rest_rad| {
-                STEADY
-                    .map(|factor| with_strength(base.with("rest_rad", rest_rad), from_neutral(base, factor)))
-            })
-            .collect(),
-        // The other two quarters are these with the other sign.
-        "encoder_eccentricity" => (0..2)
-            .map(|quarter| base.with("phase_rad", f64::from(quarter) * TAU / 4.0 - TAU / 2.0 + 0.01))
-            .collect(),
-        "sensor_gain_error" => [0.92, 1.08].map(|gain| base.with("gain", gain)).to_vec(),
-        "sensor_lag" => [0.01, 0.05].map(|lag| base.with("time_constant_s", lag)).to_vec(),
-        _ => match (strength, onset) {
-            (None, _) => vec![base],
-            (Some(_), Some(onset)) => onset_starts(base, onset, objective.duration_s()),
-            (Some(strength), None) => {
-                // What has either sign goes nearly with its strength; screening finds the sign.
-                let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &STEADY };
-                let values: Vec<f64> = factors
-                    .iter()
-                    .map(|factor| from_neutral(base, *factor))
-                    .map(|value| value.clamp(strength.lower, strength.upper))
-                    .collect();
-                steady_starts(base, &values)
-            }
-        },
+        Starts::MeanDifference => offset_start(base, objective, predictions).into_iter().collect(),
+        Starts::LargestShown => saturation_start(base, objective).into_iter().collect(),
+        Starts::EndsOfTravel => end_stop_starts(base, model, objective),
+    }
+}
+
+/// At some strengths, or at some moments.
+fn usual_starts(base: ActiveEffect, objective: &Objective) -> Vec<ActiveEffect> {
+    let parameters = base.descriptor().parameters;
+    let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
+    match (parameters.first(), onset) {
+        (None, _) => vec![base],
+        (Some(_), Some(onset)) => onset_starts(base, onset, objective.duration_s()),
+        (Some(strength), None) => {
+            // What has either sign goes nearly with its strength; screening finds the sign.
+            let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &STEADY };
+            let values: Vec<f64> = factors
+                .iter()
+                .map(|factor| from_neutral(base, *factor))
+                .map(|value| value.clamp(strength.lower, strength.upper))
+                .collect();
+            steady_starts(base, &values)
+        }
     }
 }
 

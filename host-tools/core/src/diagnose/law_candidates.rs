@@ -72,7 +72,7 @@ pub(super) fn law_candidates(
             Target::One(channel) => ground.samples.of(Series::Channel(*channel)).is_some(),
             _ => true,
         };
-        for target in targets(model, law.descriptor()).into_iter().filter(seen) {
+        for target in targets(model, law).into_iter().filter(seen) {
             let contained = model.effects.iter().any(|active| {
                 law::of(active).is_some_and(|other| other.port() == law.port() && other.form() == law.form())
                     && (target == Target::None || overlaps(active.target, target))

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
+use bowden_model::search::Starts;
 
 use crate::fit::objective::{Objective, Series};
 use crate::joint_model::JointModel;
@@ -20,10 +21,10 @@ const STRIDE: usize = 5;
 
 /// Whether `effect` is locked to an angle that the recordings turn through fewer than [`FEWEST_PERIODS`] of its periods.
 pub(super) fn too_little_travel(objective: &Objective, effect: &ActiveEffect) -> bool {
-    let angle_rad = |recording| match effect.descriptor().id {
-        "motor_cogging" => objective.input(recording).motion().map(|motion| motion.theta_rad.as_slice()),
-        "joint_torque_ripple" => objective.measured(recording, Series::Channel(Channel::ThetaOut)),
-        _ => None,
+    let Starts::LockedTo(angle) = effect.effect.starts() else { return false };
+    let angle_rad = |recording| match angle {
+        Channel::ThetaIn => objective.input(recording).motion().map(|motion| motion.theta_rad.as_slice()),
+        _ => objective.measured(recording, Series::Channel(angle)),
     };
     let angles_rad = (0..objective.recordings()).filter_map(angle_rad).flatten().copied();
     travel_rad(angles_rad).is_some_and(|travel_rad| effect.parameters[1] / TAU * travel_rad < FEWEST_PERIODS)
@@ -39,7 +40,7 @@ fn travel_rad(angles_rad: impl Iterator<Item = f64>) -> Option<f64> {
 /// Amplitude, period and phase of a torque locked to an angle, by least squares over whole numbers of periods a turn.
 ///
 /// `samples` gives, for one recording, angle and torque sample by sample.
-fn locked_start(
+fn strongest_pattern(
     base: ActiveEffect,
     predictions: &[Prediction],
     samples: impl Fn(usize, &Prediction) -> Option<Vec<(f64, f64)>>,
@@ -79,14 +80,28 @@ fn locked_start(
     best.map(|(_, start)| start)
 }
 
+/// The pattern along an angle of the input or of the joint that is left there.
+pub(super) fn locked_start(
+    base: ActiveEffect,
+    angle: Channel,
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Option<ActiveEffect> {
+    match angle {
+        Channel::ThetaOut => ripple_start(base, model, objective, predictions),
+        _ => cogging_start(base, objective, predictions),
+    }
+}
+
 /// What the motor's model lacks is the torque that guided it, or that a spindle without motor took beyond what was
 /// predicted.
-pub(super) fn cogging_start(
+fn cogging_start(
     base: ActiveEffect,
     objective: &Objective,
     predictions: &[Prediction],
 ) -> Option<ActiveEffect> {
-    locked_start(base, predictions, |recording, prediction| {
+    strongest_pattern(base, predictions, |recording, prediction| {
         let motion = objective.input(recording).motion()?;
         let lacking = lacking_nm(objective, recording, prediction)?;
         let lacking = lacking.into_iter().enumerate().step_by(STRIDE);
@@ -109,14 +124,14 @@ fn lacking_nm(objective: &Objective, recording: usize, prediction: &Prediction) 
 }
 
 /// What the joint's model lacks is what the cables carried less than predicted.
-pub(super) fn ripple_start(
+fn ripple_start(
     base: ActiveEffect,
     model: &JointModel,
     objective: &Objective,
     predictions: &[Prediction],
 ) -> Option<ActiveEffect> {
     let radius_m = model.parameters.pulleys?.output_radius_m;
-    locked_start(base, predictions, |recording, prediction| {
+    strongest_pattern(base, predictions, |recording, prediction| {
         let of = |channel| {
             let measured = objective.measured(recording, Series::Channel(channel))?;
             Some((measured, prediction.channel(channel)?))
@@ -133,7 +148,7 @@ mod tests {
     use bowden_model::effect::ActiveEffect;
     use bowden_model::effects::find;
 
-    use super::{locked_start, too_little_travel};
+    use super::{strongest_pattern, too_little_travel};
     use crate::fit::objective::Objective;
     use crate::joint_model::JointModel;
     use crate::simulation::Prediction;
@@ -149,7 +164,7 @@ mod tests {
             let angles_rad = (0..=400).map(|k| travel_rad * f64::from(k) / 400.0);
             let samples: Vec<(f64, f64)> = angles_rad.map(|angle| (angle, torque_nm(angle))).collect();
             let one = [Prediction::default()];
-            locked_start(effect("motor_cogging"), &one, |_, _| Some(samples.clone())).unwrap().parameters
+            strongest_pattern(effect("motor_cogging"), &one, |_, _| Some(samples.clone())).unwrap().parameters
         };
         let wave = started(20.0, |angle| 0.3 * (7.0 * angle + 0.4).sin());
         for (value, expected) in wave.iter().zip([0.3, 7.0, 0.4]) {

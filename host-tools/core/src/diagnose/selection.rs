@@ -7,7 +7,6 @@ mod trying;
 use std::cmp::Ordering;
 
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
-use bowden_model::law;
 use rayon::prelude::*;
 
 use super::layout::{Layout, largest_ordinary};
@@ -29,20 +28,12 @@ const MUCH_LEFT: f64 = 10.0;
 
 /// Loss, in squared scales, that an effect must remove whatever the share. On fifty virtual benches that hide nothing
 /// (`prove`, groups `nothing` and `parameters`) candidates remove up to 0.04, as `search` in their `diagnosis.json` tells, but
-/// for friction of the sheath that falls at a crawl ([`LEAST_FALL_M_S`]), up to 0.27, and for one bench, up to 0.20, where the
+/// for friction of the sheath that falls at a crawl (`sheath_stribeck_friction`), up to 0.27, and for one bench, up to 0.20, where the
 /// rig that would be written does not gain by it.
 pub const WORTHWHILE_LOSS: f64 = 0.1;
 
 /// Advantage in held-out loss that each further parameter must earn between two candidates.
 const LOSS_PER_PARAMETER: f64 = 0.03;
-
-/// Strength, as a part of the typical one, below which an effect is not worth a name.
-const NAMED_STRENGTH: f64 = 0.1;
-
-/// Excess of a sheath's friction at rest times the speed over which it falls, m/s, below which it is no more than how contacts
-/// give way: over some ten micrometres, less than the count of an encoder. On virtual benches whose sheaths stick,
-/// 0.8 to 3.5 mm/s came out; on the fifty that hide nothing, at most 0.09 mm/s, at speeds of 0.1 to 1.4 mm/s.
-const LEAST_FALL_M_S: f64 = 2.5e-4;
 
 /// Candidates whose fit is brought to an end, of those that fit best so far.
 const FINALISTS: usize = 3;
@@ -407,30 +398,11 @@ pub fn worthwhile(before: f64, after: f64) -> bool {
 /// to be told.
 fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffect) -> bool {
     let descriptor = effect.descriptor();
-    // How large a law usually is nobody knows; the loss alone decides.
-    if law::of(effect).is_some() {
-        return false;
-    }
     let Some(strength) = descriptor.parameters.first() else { return false };
     let usual = typical(believed, descriptor.component, strength);
-    let value = effect.parameters[0];
-    if largest_ordinary(believed, descriptor.id).is_some_and(|largest| value <= largest)
+    largest_ordinary(believed, descriptor.id).is_some_and(|largest| effect.parameters[0] <= largest)
         || too_little_travel(objective, effect)
-    {
-        return true;
-    }
-    let hardly_there = || {
-        let least = |neutral: f64| NAMED_STRENGTH * (usual - neutral).abs();
-        descriptor.neutral.is_some_and(|neutral| (value - neutral).abs() < least(neutral))
-    };
-    match descriptor.id {
-        // Friction that hardly falls with speed is dry friction, which has a name of its own.
-        "motor_stribeck_friction" => value < (0.3 * effect.parameters[2]).max(NAMED_STRENGTH * usual),
-        "sheath_stribeck_friction" => (value - 1.0) * effect.parameters[1] < LEAST_FALL_M_S || hardly_there(),
-        // The typical offset depends on the channel; the loss alone decides.
-        "sensor_offset" => false,
-        _ => hardly_there(),
-    }
+        || effect.effect.is_hardly_there(&effect.parameters, usual)
 }
 
 #[cfg(test)]

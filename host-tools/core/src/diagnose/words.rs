@@ -44,7 +44,7 @@ pub(super) fn rivals(
     for (tried, odds) in odds {
         let descriptor = tried.effect.descriptor();
         if odds > LISTED_ODDS && rivals.iter().all(|rival| rival.id != descriptor.id) {
-            let general = || experiment(descriptor.id, descriptor.component).to_owned();
+            let general = || experiment(&tried.effect).to_owned();
             rivals.push(Rival {
                 id: descriptor.id.to_owned(),
                 probability: present * odds / sum,
@@ -56,36 +56,13 @@ pub(super) fn rivals(
 }
 
 /// What to record so that an effect shows apart from others.
-fn experiment(id: &str, component: Component) -> &'static str {
-    match id {
-        "motor_coulomb_friction" | "motor_viscous_friction" | "motor_stribeck_friction" => {
-            "constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded"
-        }
-        "gear_load_friction" => "the same slow triangle with the arm unloaded and with full weight",
-        "motor_cogging" => {
-            "one slow turn at constant speed in each direction with the tendons at low pretension"
-        }
-        "sheath_viscous_friction" | "sheath_stribeck_friction" => {
-            "triangles of equal amplitude at five speeds over two decades"
-        }
-        "bending_friction" => "the same slow triangle at three pretensions",
-        "asymmetric_friction" => "slow triangles with the weight pulling on cable a, then on cable b",
-        "joint_backlash" | "transmission_backlash" | "gear_backlash" => {
-            "slow small triangles about the hanging position, where the torque changes sign"
-        }
-        "joint_spring" | "payload_change" => {
-            "holding at five poses across the whole range for two seconds each"
-        }
-        "wrap_angle_varies_with_pose" => "small slow triangles at five poses across the whole range",
-        _ => match component {
-            Component::Motor => "slow triangles with the tendons unloaded",
-            Component::Transmission => {
-                "slow triangles at three amplitudes with holds of two seconds at the ends"
-            }
-            Component::Joint => "slow triangles with the weight removed",
-            Component::Sensors => "the same motion with the channel's sensor exchanged for its neighbour's",
-        },
-    }
+fn experiment(effect: &ActiveEffect) -> &'static str {
+    effect.effect.told_apart_by().unwrap_or(match effect.descriptor().component {
+        Component::Motor => "slow triangles with the tendons unloaded",
+        Component::Transmission => "slow triangles at three amplitudes with holds of two seconds at the ends",
+        Component::Joint => "slow triangles with the weight removed",
+        Component::Sensors => "the same motion with the channel's sensor exchanged for its neighbour's",
+    })
 }
 
 /// One plain sentence on an effect.

@@ -1,0 +1,56 @@
+//! What a search for missing physics has to know of an effect: where it starts from, when there is hardly any of it, what is left
+//! when the recordings are over.
+
+use crate::channel::Channel;
+
+/// Strength, as a part of the usual one, below which an effect is not worth a name.
+pub const NAMED_STRENGTH: f64 = 0.1;
+
+/// Where a search starts from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Starts {
+    /// From the usual strength, from less and from more; where friction falls with speed, at several speeds; what happens at a moment,
+    /// at moments spread over the recordings.
+    Usual,
+    /// From strengths a third of an octave apart, up to two octaves from the usual one.
+    ThirdsOfOctaves,
+    /// From the usual strength at each of these values of a parameter.
+    At(&'static str, &'static [f64]),
+    /// From the usual strength, from less and from more at each of these values of a parameter.
+    StrengthsAt(&'static str, &'static [f64]),
+    /// From the pattern that is left along an angle.
+    LockedTo(Channel),
+    /// From what the power of the recordings, kept up, would heat the winding by.
+    HeatByPower,
+    /// From the mean difference of the channel.
+    MeanDifference,
+    /// From the largest value that the channel shows.
+    LargestShown,
+    /// From both ends of the joint's travel.
+    EndsOfTravel,
+}
+
+/// What an effect leaves when the recordings are over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aftermath {
+    /// Whether it goes on.
+    pub goes_on: bool,
+    /// Factor of the sheath's friction coefficient.
+    pub friction_factor: f64,
+    /// What the reading of its channel stays off by, SI unit of the channel.
+    pub offset: f64,
+}
+
+impl Aftermath {
+    /// It goes on, and nothing else.
+    pub const NONE: Self = Self { goes_on: true, friction_factor: 1.0, offset: 0.0 };
+
+    /// It has passed.
+    pub const GONE: Self = Self { goes_on: false, ..Self::NONE };
+}
+
+/// Whether a strength is nearer to `neutral`, at which the effect vanishes, than [`NAMED_STRENGTH`] of the usual one.
+#[must_use]
+pub fn is_weak(strength: f64, neutral: f64, usual: f64) -> bool {
+    (strength - neutral).abs() < NAMED_STRENGTH * (usual - neutral).abs()
+}
