@@ -20,7 +20,7 @@ pub const COARSE_STEP: f64 = 0.1;
 /// Step that then finds the place.
 pub const FINE_STEP: f64 = 0.02;
 
-/// Longest first step of a round, in the optimiser's coordinate of the parameter that the residuals answer to most.
+/// Longest first step of a round, in the optimiser's coordinate of the parameter that the residuals answer to least.
 const FIRST_STEP: f64 = 0.5;
 
 /// Result of a fit.
