@@ -223,15 +223,9 @@ impl Fitted {
         self.layout.without_ordinary(&self.solution.model)
     }
 
-    /// Held-out loss with the advantage that simpler effects get. A form that is not the usual one must be worth its choice as a name
-    /// must.
+    /// Held-out loss with the advantage that simpler effects get.
     fn handicapped(&self) -> f64 {
-        let newest = self.newest();
-        let parameters = newest.descriptor().parameters;
-        let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
-        let share =
-            if parameters.iter().zip(newest.parameters).any(unusual) { WORTHWHILE_SHARE } else { 0.0 };
-        self.loss * (1.0 + LOSS_PER_PARAMETER * parameters.len() as f64) / (1.0 - share)
+        self.loss * handicap(&self.newest())
     }
 
     fn best_first(&self, other: &Self) -> Ordering {
@@ -382,6 +376,15 @@ impl Search<'_> {
         let loss = self.objective.mean_loss(&solution.residuals, Part::HeldOut);
         Fitted { layout, solution, loss, finished, unseen: false }
     }
+}
+
+/// Factor of the held-out loss with an effect: its parameters count, and a form that is not the usual one must be worth its choice as
+/// a name must.
+fn handicap(effect: &ActiveEffect) -> f64 {
+    let parameters = effect.descriptor().parameters;
+    let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
+    let share = if parameters.iter().zip(effect.parameters).any(unusual) { WORTHWHILE_SHARE } else { 0.0 };
+    (1.0 + LOSS_PER_PARAMETER * parameters.len() as f64) / (1.0 - share)
 }
 
 /// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.

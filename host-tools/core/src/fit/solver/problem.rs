@@ -162,19 +162,15 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     fn jacobian(&self) -> Option<DMatrix<f64>> {
         let residuals = self.current.clone()?;
         let rows = self.weighted(&residuals, &self.x);
-        let mut stood = self.stood.lock().unwrap_or_else(PoisonError::into_inner);
-        let carried_on = || {
-            let place = stood.as_ref().filter(|place| place.steps < self.most_steps())?;
-            Some((place.slopes_after_step(&self.x, &rows)?, place.steps + 1))
-        };
         let (slopes, steps) = match &self.begun {
             Some((x, slopes)) if *x == self.x => (self.with_priors(slopes.clone()), 0),
-            _ => match carried_on() {
+            _ => match self.carried_on(&rows) {
                 Some(carried_on) => carried_on,
                 None => (self.slopes()?, 0),
             },
         };
-        *stood = Some(Place { x: self.x.clone(), residuals, rows, slopes: slopes.clone(), steps });
+        let place = Place { x: self.x.clone(), residuals, rows, slopes: slopes.clone(), steps };
+        *self.stood.lock().unwrap_or_else(PoisonError::into_inner) = Some(place);
         Some(slopes)
     }
 }
@@ -186,6 +182,14 @@ impl Problem<'_> {
             return 0;
         }
         CARRIED_ON[usize::from(self.step < COARSE_STEP)]
+    }
+
+    /// Slopes here, where the weighted residuals are `rows`, by the step from where the optimiser stood last, and over how many steps they
+    /// are then carried on.
+    fn carried_on(&self, rows: &DVector<f64>) -> Option<(DMatrix<f64>, usize)> {
+        let stood = self.stood.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = stood.as_ref().filter(|place| place.steps < self.most_steps())?;
+        Some((place.slopes_after_step(&self.x, rows)?, place.steps + 1))
     }
 
     /// Longest first step, in units of the optimiser: by it the coordinate that the residuals answer to least may change by `reach`, and the
