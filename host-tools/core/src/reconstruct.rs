@@ -1,10 +1,12 @@
 //! Reconstruction of what an encoder could not resolve.
 
+mod quantum;
 mod smoother;
 
 use std::collections::VecDeque;
 
-pub use smoother::{Motion, quantum_of, smooth};
+pub use quantum::quantum_of;
+pub use smoother::{Motion, smooth};
 
 /// Mean over `2 half + 1` samples around each sample; fewer at the ends. Takes the place of the values.
 #[must_use]

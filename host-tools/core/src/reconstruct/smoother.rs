@@ -9,6 +9,8 @@
 //! readings counts as one reading (each with `n` times the variance), and a change of one count is a reading of its
 //! own, halfway between the two values.
 
+use super::quantum::quantum_of;
+
 /// Angle, speed and their uncertainty at every sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
@@ -42,26 +44,6 @@ impl Motion {
 
 /// Spectral densities of the acceleration noise that are tried, rad²/s³: from a slow robot arm to a shaker.
 const DENSITIES: [f64; 8] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4];
-
-/// Resolution of a signal: the smallest step between different values, and whether the signal is quantised at all.
-///
-/// Returns `None` for a signal that is not stepped: fewer than one in four samples repeat the value before.
-#[must_use]
-pub fn quantum_of(values: &[f64]) -> Option<f64> {
-    let mut smallest = f64::INFINITY;
-    let mut repeats = 0_usize;
-    let span = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for pair in values.windows(2) {
-        let step = (pair[1] - pair[0]).abs();
-        if step <= span * 1e-9 {
-            repeats += 1;
-        } else {
-            smallest = smallest.min(step);
-        }
-    }
-    let stepped = repeats * 4 > values.len() && smallest.is_finite();
-    stepped.then_some(smallest)
-}
 
 /// Reconstructs the motion behind an encoder of resolution `quantum_rad`.
 ///
