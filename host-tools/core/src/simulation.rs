@@ -155,4 +155,34 @@ mod tests {
         }
         assert!(same(&of_strong.guide_nm, &of_weak.guide_nm, SHARE), "guide");
     }
+
+    /// How late a guided angle is does not follow from the step: held against the end of its step it would run ahead by a step.
+    #[test]
+    fn a_guided_angle_does_not_run_ahead_by_a_step() {
+        let mut recording = test_bench::swung(3000);
+        recording.set(Channel::Duty, vec![0.0; 3000]);
+        recording.set(Channel::BusVoltage, vec![24.0; 3000]);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        assert_eq!(model.drive().unwrap(), Drive::GuidedMotor);
+        // Slope of the angle by which it is late over the speed, s.
+        let late_s = |step_s: f64| -> f64 {
+            let model = JointModel { step_s, ..model.clone() };
+            let input = ReplayInput::new(&model, &recording).unwrap();
+            let turned = replay_of(&model, &input, &[Channel::ThetaIn]).unwrap();
+            let motion = input.motion().unwrap();
+            let angles = motion.theta_rad.iter().zip(turned.channel(Channel::ThetaIn).unwrap());
+            let (mut along, mut power) = (0.0, 0.0);
+            for ((recorded, simulated), speed) in angles.zip(&motion.omega_rad_s).skip(500) {
+                along += (recorded - simulated) * speed;
+                power += speed * speed;
+            }
+            along / power
+        };
+        let (coarse_s, fine_s) = (5e-4, 1e-4);
+        let later_s = late_s(coarse_s) - late_s(fine_s);
+        assert!(
+            later_s.abs() < 0.2 * (coarse_s - fine_s),
+            "{later_s} s between steps of {coarse_s} and {fine_s} s"
+        );
+    }
 }

@@ -72,17 +72,22 @@ impl Run<'_> {
                 let steps = (span_s / longest_s - 1e-9).ceil().max(1.0);
                 let dt_s = span_s / steps;
                 for sub in 1..=steps as usize {
-                    let share = sub as f64 / steps;
-                    let wanted =
-                        from_rad.zip(wanted_rad).map_or(0.0, |(from, to)| from + (to - from) * share);
-                    let mut step = self.step_input(k - 1, wanted);
+                    // Where the recording stands after a part of the steps between two samples.
+                    let recorded_rad = |steps_done: usize| {
+                        let share = steps_done as f64 / steps;
+                        from_rad.zip(wanted_rad).map_or(0.0, |(from, to)| from + (to - from) * share)
+                    };
+                    // An angle that is prescribed is the one at the end of the step.
+                    let mut step = self.step_input(k - 1, recorded_rad(sub));
                     match self.drive {
                         Drive::GuidedMotor => {
                             let band = input
                                 .motion
                                 .as_ref()
                                 .map_or(0.0, |m| GUIDE_DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
-                            let error = plant.theta_in_rad() - wanted;
+                            // The plant stands where the step begins, and so does what it is held against: with the
+                            // end of the step it would run ahead of the recording by a step.
+                            let error = plant.theta_in_rad() - recorded_rad(sub - 1);
                             let beyond = error - error.clamp(-band, band);
                             if beyond != 0.0 {
                                 let stiffness_nm_per_rad = PLAY_GUIDE * input.cables_nm_per_rad;
