@@ -5,6 +5,7 @@
 //! the rest.
 
 mod locate;
+mod repeated;
 pub(super) mod samples;
 pub(super) mod shape;
 pub(super) mod structure;

@@ -100,19 +100,31 @@ impl Shape {
         self.variable() == Variable::Time
     }
 
-    /// Fits the form to `values`, one a row.
+    /// Whether it is multiplied with the current.
+    const fn grows_with_current(self) -> bool {
+        matches!(self, Self::Curve { times: Factor::Current, .. } | Self::Wave { times: Factor::Current, .. })
+    }
+
+    /// Fits the form to `values`, one a row. Of one that grows with the current only the change over time counts: what is in the
+    /// same proportion to the current all the time is a gain, and no form describes it.
     pub(crate) fn fit(self, samples: &Samples, values: &[f64]) -> Option<Fitted> {
         let x = samples.variable(self.variable())?;
         let factor = match self {
-            Self::Curve { times: Factor::Current, .. } | Self::Wave { times: Factor::Current, .. } => {
-                Some(samples.variable(Variable::Current)?)
-            }
+            _ if self.grows_with_current() => Some(samples.variable(Variable::Current)?),
             Self::Curve { times: Factor::Direction, .. } => Some(samples.direction.as_slice()),
             Self::Spot { .. } => Some(samples.last_direction.as_slice()),
             _ => None,
         };
         let alone = self.is_of_one_recording();
         let unseen = if alone { &samples.third_second } else { &samples.held_out };
+        let without_gain;
+        let values = match factor {
+            Some(current) if self.grows_with_current() => {
+                without_gain = less_a_gain(samples, unseen, current, values);
+                &without_gain
+            }
+            _ => values,
+        };
         let mut form = vec![0.0; samples.len()];
         let mut first = None;
         let mut start = 0;
@@ -259,6 +271,22 @@ impl Shape {
             }
         }
     }
+}
+
+/// `values` of every recording without their part in proportion to `current`, as the rows that are not `unseen` have it.
+fn less_a_gain(samples: &Samples, unseen: &[bool], current: &[f64], values: &[f64]) -> Vec<f64> {
+    let recordings = samples.recording.last().map_or(0, |last| last + 1);
+    let mut sums = vec![(0.0, f64::MIN_POSITIVE); recordings];
+    for k in (0..samples.len()).filter(|k| !unseen[*k] && values[*k].is_finite()) {
+        let (along, power) = &mut sums[samples.recording[k]];
+        *along += current[k] * values[k];
+        *power += current[k] * current[k];
+    }
+    let left = |(k, value): (usize, &f64)| {
+        let (along, power) = sums[samples.recording[k]];
+        value - along / power * current[k]
+    };
+    values.iter().enumerate().map(left).collect()
 }
 
 /// Smallest and largest value, never the same.

@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 use bowden_model::channel::Channel;
 use rayon::prelude::*;
 
+use super::repeated::{period_s, without_what_repeats};
 use super::samples::{Left, Samples, Variable};
 use super::shape::{Factor, Fitted, Rows, Shape, best_rate, best_spot, ends_of};
 use crate::diagnose::locked::FEWEST_PERIODS;
@@ -196,7 +197,8 @@ fn tried(samples: &Samples, left: &Left) -> impl Iterator<Item = (Shape, Fitted)
     shapes.into_iter().filter_map(|shape| Some((shape, shape.fit(samples, &left.soft)?)))
 }
 
-/// Wave over time, times the current or not, that takes most off the rows that may be fitted, in the longest recording.
+/// Wave over time, times the current or not, that takes most off the rows that may be fitted, in the longest recording. Where the motion
+/// repeats itself, what is left in the same way in every period is left out: it may as well follow the motion.
 fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     let t_s = samples.variable(Variable::Time)?;
     let weights = if times == Factor::Current { Some(samples.variable(Variable::Current)?) } else { None };
@@ -210,7 +212,7 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
             && left.soft[*k].is_finite()
     };
     let rows: Vec<usize> = (0..samples.len()).filter(usable).collect();
-    let table = centred(t_s, weights, left, &rows);
+    let mut table = centred(t_s, weights, left, &rows);
     let (first_s, last_s) = ends_of(&table.x);
     // Rows farther apart than half a period tell nothing of it.
     let spacing_s = (last_s - first_s) / (1.5 * rows.len() as f64);
@@ -222,9 +224,21 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     if rows.len() < 100 || highest_hz <= lowest_hz {
         return None;
     }
+    if let Some(period_s) = motion_period_s(samples, longest) {
+        without_what_repeats(&mut table.values, &table.x, period_s, spacing_s);
+    }
     let step = PI / (last_s - first_s) / if times == Factor::Current { 2.0 } else { 1.0 };
     let rate = best_rate(&table, (TAU * lowest_hz, TAU * highest_hz), step)?;
     Some(Shape::Wave { of: Variable::Time, rate, waves: 1, times })
+}
+
+/// Time after which the motion of a recording repeats itself, s, in the window in which a frequency is looked for.
+fn motion_period_s(samples: &Samples, recording: usize) -> Option<f64> {
+    let (t_s, theta_rad) = (samples.variable(Variable::Time)?, samples.variable(Variable::ThetaIn)?);
+    let of_it = |k: &usize| samples.recording[*k] == recording && t_s[*k] < FREQUENCY_WINDOW_S;
+    let rows: Vec<usize> = (0..samples.len()).filter(of_it).collect();
+    let of_rows = |values: &[f64]| -> Vec<f64> { rows.iter().map(|k| values[*k]).collect() };
+    period_s(&of_rows(t_s), &of_rows(theta_rad))
 }
 
 /// Wave over a position that takes most off the rows that may be fitted.

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use super::locate::{Answer, component};
 use super::samples::{Left, Samples, Variable};
 use super::shape::{Factor, Shape, best_spot};
-use super::structure::strongest;
+use super::structure::{frequencies_hz, strongest};
 use super::{Unexplained, described};
 use crate::fit::objective::Series;
 
@@ -136,6 +136,36 @@ fn an_oscillation_of_one_channel_is_a_sensors_with_its_frequency() {
     assert_eq!(told.depends_on, ["t_s"]);
     let hz = told.frequency_hz.expect("a frequency");
     assert!((hz - 13.3).abs() < 0.02, "{hz} Hz");
+}
+
+/// A motion of 0.25 and 0.75 Hz passes everything again after 4 s. So does 3.25 Hz, thirteen times in 4 s; 3.4 Hz does not.
+#[test]
+fn an_oscillation_is_told_from_what_a_repeated_motion_leaves_in_every_period() {
+    let turn = |hz: f64, k: usize| (TAU * hz * 0.01 * k as f64 + 0.5).sin();
+    let theta_rad: Vec<f64> = (0..ROWS).map(|k| 0.4 * turn(0.25, k) + 0.2 * turn(0.75, k)).collect();
+    let nearest_hz = |hz: f64| {
+        let swing = (0..ROWS).map(|k| 1.5 * turn(hz, k));
+        let rows = vec![left(Channel::F3, sum(&noise(9), swing))];
+        let samples = Samples::of_one_recording(&theta_rad, &current_a(), rows);
+        let off_hz = frequencies_hz(&samples, None).into_iter().map(|found| (found - hz).abs());
+        off_hz.fold(f64::INFINITY, f64::min)
+    };
+    assert!(nearest_hz(3.4) < 0.01, "{} Hz", nearest_hz(3.4));
+    assert!(nearest_hz(3.25) > 0.02, "{} Hz", nearest_hz(3.25));
+}
+
+/// A current that is read 2 % too small at all times is a gain.
+#[test]
+fn what_is_in_proportion_to_the_current_all_the_time_is_no_swing() {
+    let gain = current_a().into_iter().map(|current_a| 3.0 * current_a);
+    let samples = samples(vec![left(Channel::MotorCurrent, sum(&noise(11), gain))]);
+    for shape in [
+        Shape::Wave { of: Variable::Time, rate: 0.7, waves: 1, times: Factor::Current },
+        Shape::Curve { of: Variable::Time, nodes: 0, times: Factor::Current },
+    ] {
+        let fitted = shape.fit(&samples, &samples.left[0].soft).unwrap();
+        assert!(fitted.share() < 0.01 && fitted.removed() < 0.02, "{shape:?}: {}", fitted.removed());
+    }
 }
 
 #[test]
