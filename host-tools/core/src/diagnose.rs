@@ -145,9 +145,11 @@ pub fn diagnose_within(
 ) -> Result<Diagnosed, Failure> {
     let model = study.joint()?;
     let experiments: Vec<&Recording> = study.recordings_as(Role::Experiment).collect();
-    let training = study.recordings_as(Role::Training).chain(experiments.iter().copied()).collect();
+    let training: Vec<&Recording> =
+        study.recordings_as(Role::Training).chain(experiments.iter().copied()).collect();
     let heldout = study.recordings_as(Role::HeldOut).collect();
     let objective = Objective::of(&model, study.observed(&model)?)?;
+    judged(&objective, &training)?;
     let benches: Result<Vec<(&String, Variation)>, Failure> = study
         .benches
         .iter()
@@ -166,6 +168,20 @@ pub fn diagnose_within(
         allowed,
     };
     case.diagnosed(asked, progress)
+}
+
+/// Refuses recordings of which nothing is left to judge by.
+fn judged(objective: &Objective, training: &[&Recording]) -> Result<(), Failure> {
+    let mut blocks = (0..objective.recordings()).flat_map(|recording| objective.blocks(recording));
+    if blocks.any(|block| block.part == Part::HeldOut) {
+        return Ok(());
+    }
+    let longest = training.iter().max_by(|a, b| a.duration_s().total_cmp(&b.duration_s()));
+    let (source, duration_s) = longest.map_or(("no recording", 0.0), |r| (r.source(), r.duration_s()));
+    Err(Failure::bad_input(format!(
+        "{source}: {duration_s:.2} s are too short to judge a diagnosis by, which holds out every third second; record at least \
+         3 s, or name another recording with --heldout"
+    )))
 }
 
 impl Case<'_> {

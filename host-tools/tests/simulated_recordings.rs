@@ -1,0 +1,59 @@
+//! `bowden record` on the simulated board, then `bowden diagnose`: what the board writes is what a diagnosis can use.
+
+mod common;
+
+use std::fs;
+
+use common::bowden;
+use serde_json::Value;
+use tempfile::tempdir;
+
+/// Records every tenth tick of `seconds` on a joint that conceals `concealed`, and diagnoses that with the rig file of the data sheet.
+fn diagnosed(concealed: &str, reference: [&str; 3], seconds: &str) -> Value {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("rig.toml"), virtual_bench::nominal_rig_toml("bench")).unwrap();
+    let port = format!("sim:{concealed}");
+    let [shape, amplitude, frequency] = reference;
+    let moved = ["--reference", shape, "--amplitude", amplitude, "--frequency", frequency];
+    let record =
+        ["record", "--port", &port, "--home", "--seconds", seconds, "--every", "10", "--out", "rec.csv"];
+    let (status, _, errors) = bowden(folder.path(), &[&record, moved.as_slice()].concat());
+    assert_eq!((status, errors.contains("fault")), (0, false), "{errors}");
+    let (status, _, errors) =
+        bowden(folder.path(), &["diagnose", "rec.csv", "--rig", "rig.toml", "--out", "found"]);
+    assert_eq!(status, 0, "{errors}");
+    serde_json::from_str(&fs::read_to_string(folder.path().join("found/diagnosis.json")).unwrap()).unwrap()
+}
+
+/// Three counts a sample at the fastest, and a reference that passes the same places in every period.
+#[test]
+fn a_joint_that_conceals_nothing_is_consistent() {
+    for reference in [["multisine", "0.5", "0.25"], ["staircase", "0.4", "0.25"]] {
+        let diagnosis = diagnosed("seed=711", reference, "16");
+        assert_eq!(diagnosis["verdict"], "consistent", "{reference:?}: {}", diagnosis["summary"]);
+    }
+}
+
+/// Half of a clear fault: a whole one slackens a tendon in this motion, and the board stops.
+#[test]
+fn play_of_the_joint_is_found_in_a_fast_motion() {
+    let diagnosis = diagnosed("joint_backlash:0.5,seed=712", ["multisine", "0.4", "0.25"], "16");
+    let named: Vec<&Value> =
+        diagnosis["effects"].as_array().unwrap().iter().map(|effect| &effect["id"]).collect();
+    assert_eq!(named, ["joint_backlash"], "{}", diagnosis["summary"]);
+}
+
+/// The first two seconds are learned from, and nothing judges what was learned.
+#[test]
+fn a_run_that_was_stopped_early_is_too_short_to_be_diagnosed() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("rig.toml"), virtual_bench::nominal_rig_toml("bench")).unwrap();
+    let record =
+        ["record", "--port", "sim", "--home", "--seconds", "1.5", "--reference", "sine", "--every", "10"];
+    assert_eq!(bowden(folder.path(), &[&record[..], &["--out", "rec.csv"]].concat()).0, 0);
+    let (status, _, errors) =
+        bowden(folder.path(), &["diagnose", "rec.csv", "--rig", "rig.toml", "--out", "found"]);
+    let expected = "bowden: rec.csv: 1.50 s are too short to judge a diagnosis by, which holds out every third second; record \
+                    at least 3 s, or name another recording with --heldout\n";
+    assert_eq!((status, errors.as_str()), (2, expected));
+}
