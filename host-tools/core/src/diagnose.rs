@@ -15,6 +15,7 @@ mod hum;
 mod law_candidates;
 mod layout;
 mod locked;
+mod off_centre;
 mod onset;
 mod place;
 mod regimes;
@@ -200,6 +201,12 @@ impl Case<'_> {
         let refined =
             |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
         let mut last = refined(&selected.model)?;
+        while let Some(fewer) =
+            selected.complete.then(|| selected.without_faded(objective, &last.model)).flatten()
+        {
+            selected = fewer;
+            last = refined(&selected.model)?;
+        }
         let recalibrated = Stage::of(objective, &at_full_resolution(&selected.baseline.model, model))?;
         if selected.complete
             && !selected.chosen.is_empty()
@@ -401,6 +408,13 @@ impl Case<'_> {
             !laws.is_empty(),
             [loss_recalibrated, loss_after],
         );
+        let mut indistinguishable =
+            crate::fit::identifiability::indistinguishable(objective, &last.model).unwrap_or_default();
+        indistinguishable.extend(off_centre::groups(
+            objective,
+            &recalibrated_parameters,
+            &last.model.effects,
+        ));
         let diagnosis = Diagnosis {
             schema: SCHEMA.to_owned(),
             verdict,
@@ -408,8 +422,7 @@ impl Case<'_> {
             complete: selected.complete,
             effects,
             recalibrated: recalibrated_parameters,
-            indistinguishable: crate::fit::identifiability::indistinguishable(objective, &last.model)
-                .unwrap_or_default(),
+            indistinguishable,
             mismatch,
             residual_map: residual_map::residual_map(objective, stages),
             unexplained,

@@ -317,7 +317,7 @@ pub struct Diagnosis {
     pub effects: Vec<NamedEffect>,
     /// Every nominal parameter that was fitted.
     pub recalibrated: Vec<Recalibrated>,
-    /// Parameters that these data cannot tell apart, each group by `section.name`.
+    /// Parameters that these data cannot tell apart, each group by `section.name`; a radius may stand beside an effect.
     pub indistinguishable: Vec<Vec<String>>,
     /// Where the recalibrated simulation differs, largest share first.
     pub mismatch: Vec<Mismatch>,
