@@ -71,8 +71,9 @@ pub(crate) struct Structure {
 /// quarter (either half where there is less than one squared scale), a swing that grows with the current 0.12 of the motor's
 /// torque and current, other changes over time that do 1.1 of the joint's angle and 0.3 of the motor's torque, speed or time
 /// alone 2.7 or half, a spot that rubs 0.26 where it takes a sixth off what is there, and 0.07 where it takes two fifths or more.
-/// Each bar stands above its own.
-fn bar(shape: Shape, series: Series) -> Bar {
+/// Each bar stands above its own. Where the motion repeats itself, every place is passed in the same way again: what is left at a place may
+/// as well be what the speed and the steps there leave, and a curve over position has the bar of one over speed.
+fn bar(shape: Shape, series: Series, repeats: bool) -> Bar {
     let position = matches!(shape.variable(), Variable::ThetaIn | Variable::ThetaOut);
     match (shape, series) {
         (Shape::Wave { times: Factor::Current, .. }, Series::Guide) => Bar { share: 0.2, removed: 0.28 },
@@ -85,16 +86,17 @@ fn bar(shape: Shape, series: Series) -> Bar {
         (Shape::Wave { of: Variable::Time, .. }, _) => Bar { share: 0.2, removed: 0.3 },
         (Shape::Spot { .. }, _) => Bar { share: 0.5, removed: 0.35 },
         (Shape::Wave { .. }, _) => Bar { share: 0.35, removed: 1.0 },
-        (Shape::Curve { times: Factor::Direction, .. }, _) => Bar { share: 0.4, removed: 2.2 },
-        (Shape::Curve { .. }, _) if position => Bar { share: 0.38, removed: 2.2 },
+        (Shape::Curve { times: Factor::Direction, .. }, _) if !repeats => Bar { share: 0.4, removed: 2.2 },
+        (Shape::Curve { .. }, _) if position && !repeats => Bar { share: 0.38, removed: 2.2 },
         (Shape::Curve { .. }, _) => Bar { share: 0.6, removed: 6.0 },
     }
 }
 
 /// The strongest structure that stands above its bar.
 pub(crate) fn strongest(samples: &Samples) -> Option<Structure> {
+    let repeats = longest(samples).is_some_and(|recording| motion_period_s(samples, recording).is_some());
     let clear = |left: &Left, (shape, fitted): &(Shape, Fitted)| {
-        let bar = bar(*shape, left.series);
+        let bar = bar(*shape, left.series, repeats);
         fitted.share() >= bar.share && fitted.removed() >= bar.removed
     };
     let all: Vec<Vec<(Shape, Fitted)>> = samples
@@ -202,9 +204,7 @@ fn tried(samples: &Samples, left: &Left) -> impl Iterator<Item = (Shape, Fitted)
 fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     let t_s = samples.variable(Variable::Time)?;
     let weights = if times == Factor::Current { Some(samples.variable(Variable::Current)?) } else { None };
-    let recordings = samples.recording.last()? + 1;
-    let rows_of = |recording: &usize| samples.recording.iter().filter(|r| *r == recording).count();
-    let longest = (0..recordings).max_by_key(rows_of)?;
+    let longest = longest(samples)?;
     let usable = |k: &usize| {
         samples.recording[*k] == longest
             && !samples.third_second[*k]
@@ -230,6 +230,13 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     let step = PI / (last_s - first_s) / if times == Factor::Current { 2.0 } else { 1.0 };
     let rate = best_rate(&table, (TAU * lowest_hz, TAU * highest_hz), step)?;
     Some(Shape::Wave { of: Variable::Time, rate, waves: 1, times })
+}
+
+/// Recording with the most rows.
+fn longest(samples: &Samples) -> Option<usize> {
+    let recordings = samples.recording.last()? + 1;
+    let rows_of = |recording: &usize| samples.recording.iter().filter(|r| *r == recording).count();
+    (0..recordings).max_by_key(rows_of)
 }
 
 /// Time after which the motion of a recording repeats itself, s, in the window in which a frequency is looked for.
