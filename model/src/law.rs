@@ -127,6 +127,9 @@ impl Variable {
     }
 }
 
+/// Turn of a branch below which a loop along an angle is not told from dry friction \[rad\]: three counts of a 12-bit encoder.
+const NARROWEST_LOOP_RAD: f64 = 5e-3;
+
 /// Port, variable and form of a law, with its coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
@@ -185,9 +188,11 @@ impl Effect for Law {
         true
     }
 
-    /// How large a law usually is nobody knows; the loss alone decides.
-    fn is_hardly_there(&self, _p: &[f64; MAX_PARAMETERS], _usual: f64) -> bool {
-        false
+    /// How large a law usually is nobody knows; the loss alone decides. A loop along an angle that is narrower than what dry friction gives
+    /// way by is dry friction, which has a name.
+    fn is_hardly_there(&self, p: &[f64; MAX_PARAMETERS], _usual: f64) -> bool {
+        let turns = matches!(self.variable, Variable::InputAngle | Variable::JointAngle);
+        self.form == Form::Hysteresis && turns && p[1] < NARROWEST_LOOP_RAD
     }
 
     /// What sets in has partly done so, and a swing has run on.

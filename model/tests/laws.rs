@@ -175,3 +175,11 @@ fn a_pulley_that_comes_back_has_wound_what_it_had() {
         assert!((now - before).abs() < 1e-6, "{now} N, at first {before} N");
     }
 }
+
+/// Three counts of a 12-bit encoder are 4.6 mrad: a branch of 2 mrad is the giving way of dry friction, one of 20 mrad is not.
+#[test]
+fn a_loop_narrower_than_an_encoder_shows_is_dry_friction() {
+    let law = find("law_joint_torque_hysteresis").unwrap();
+    let with = |width_rad: f64| law.is_hardly_there(&coefficients(&[0.04, width_rad]), 0.1);
+    assert!(with(0.002) && !with(0.02));
+}
