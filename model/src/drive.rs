@@ -80,16 +80,3 @@ pub fn after_elastic_friction_rad_s(
     *presliding = (*presliding + per_speed * sticking_rad_s).clamp(-1.0, 1.0);
     omega_rad_s - loss * *presliding
 }
-
-/// Speed after dry friction of `level_nm` acted for `dt_s` on `inertia_kg_m2`: opposes motion, never reverses it.
-#[must_use]
-pub fn after_dry_friction_rad_s(omega_rad_s: f64, level_nm: f64, inertia_kg_m2: f64, dt_s: f64) -> f64 {
-    let loss = level_nm * dt_s / inertia_kg_m2;
-    if omega_rad_s > loss {
-        omega_rad_s - loss
-    } else if omega_rad_s < -loss {
-        omega_rad_s + loss
-    } else {
-        0.0
-    }
-}

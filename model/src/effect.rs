@@ -169,9 +169,18 @@ pub struct DrivePort {
     pub resistance_ohm: f64,
 }
 
-/// Turn at the input pulley over which the dry friction of a motor and its gear usually builds up after a reversal, rad:
-/// balls, seals and teeth give way elastically by about one ten-thousandth of a turn.
+/// Turn over which dry friction of a motor with its gear (at the input pulley) or of a joint usually builds up after a reversal,
+/// rad: balls, seals and teeth give way elastically by about one ten-thousandth of a turn.
 pub const PRESLIDING_RAD: f64 = 5e-4;
+
+/// That turn, as a parameter of dry friction.
+pub const PRESLIDING: ParameterSpec = ParameterSpec::log(
+    "presliding_rad",
+    "rad",
+    [1e-4, 3e-2],
+    PRESLIDING_RAD,
+    "turn over which it builds up after a reversal",
+);
 
 /// Mechanical side of the motor, seen at the input pulley.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -285,6 +294,8 @@ pub struct JointPort {
     pub torque_nm: f64,
     /// Level of dry friction, N·m ≥ 0; it opposes motion and never reverses it.
     pub coulomb_nm: f64,
+    /// Turn over which dry friction builds up after a reversal, rad > 0.
+    pub presliding_rad: f64,
     /// Play between output pulley and arm, rad.
     pub play_rad: f64,
 }

@@ -13,6 +13,7 @@ pub mod load;
 pub mod paper;
 pub mod parameters;
 pub mod plant;
+mod play;
 pub mod search;
 pub mod sheath;
 pub mod transmission;

@@ -26,7 +26,7 @@ mod spindle;
 mod step_input;
 
 use crate::channel::Channel;
-use crate::effect::Component;
+use crate::effect::{Component, MotorPort};
 use crate::effect_set::{EffectStates, FRESH_STATES};
 use crate::transmission::{PulleyMotion, Transmission, TransmissionConfig};
 
@@ -162,8 +162,12 @@ impl Plant {
             // The arm is driven by the cables as they are before either pulley moves; a torque taken between the two
             // moves would run ahead of the arm by a step and act as negative friction.
             let cable_nm = cables.torque_out_nm(parts);
-            step_input_side(&step, states, (motor, spindle), (cables, parts), joint.omega_rad_s);
+            let before_rad = spindle.theta_rad;
+            let port = step_input_side(&step, states, (motor, spindle), (cables, parts), joint.omega_rad_s);
             joint.step(&step, states, (cables, parts), cable_nm, spindle.omega_rad_s);
+            if let Some(port) = port {
+                spindle.close_gear_play(&step, (cables, parts), &port, before_rad);
+            }
         } else {
             direct::step(&step, states, motor, spindle, joint);
         }
@@ -224,7 +228,7 @@ impl Plant {
     }
 }
 
-/// Motor and input pulley, driven by the bridge or prescribed.
+/// Motor and input pulley, driven by the bridge or prescribed; returns what effects say of a motor that drives.
 #[inline]
 fn step_input_side(
     step: &Step,
@@ -232,7 +236,7 @@ fn step_input_side(
     (motor, spindle): (&mut Motor, &mut Spindle),
     (cables, parts): (&mut Transmission, &TransmissionConfig),
     omega_out_rad_s: f64,
-) {
+) -> Option<MotorPort> {
     let parameters = step.config.parameters().motor.as_ref();
     if let Some(parameters) = parameters {
         motor.conduct(step, states, parameters);
@@ -245,7 +249,8 @@ fn step_input_side(
             let delta_rad = step.dt_s * motor.omega_rad_s;
             motor.theta_rad += delta_rad;
             let turned = [motor.theta_rad, delta_rad];
-            spindle.turn_with_rotor(step, (cables, parts), parameters, &port, turned);
+            spindle.turn_with_rotor(step, (cables, parts), port.gear_play_rad, turned);
+            Some(port)
         }
         (_, parameters) => {
             let delta_rad = spindle.turn_as_prescribed(step, cables, parts);
@@ -254,6 +259,7 @@ fn step_input_side(
             if parameters.is_none() && step.config.effects().touches(Component::Motor) {
                 spindle.rub(step, states, cables.torque_in_nm(parts), delta_rad);
             }
+            None
         }
     }
 }

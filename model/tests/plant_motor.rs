@@ -231,3 +231,27 @@ fn stable_step_is_stable() {
     assert!(run.plant.omega_out_rad_s().abs() < 1e-3, "{} rad/s", run.plant.omega_out_rad_s());
     run.tensions_n().iter().for_each(|f| assert!((20.0..100.0).contains(f), "{f} N"));
 }
+
+/// An arm that is pushed through a play of pulley or gear drags both tendons along, and nothing holds the pulley: F1 = F3 at the
+/// end of each step. A play that is looked at before the arm has moved leaves the pulley behind by a step, which is 0.4 N and
+/// more here.
+#[test]
+fn inside_a_play_nothing_holds_the_pulley() {
+    let find = |id: &str| ActiveEffect::with_defaults(effects::find(id).unwrap()).with("gap_rad", 0.2);
+    for (play, input) in [
+        (find("transmission_backlash"), InputBoundary::Angle),
+        (find("gear_backlash").with("drag_behind", 0.0), InputBoundary::Motor),
+    ] {
+        let mut parameters = joint(0.12);
+        parameters.motor = (input == InputBoundary::Motor).then_some(MOTOR);
+        let mut run = Run::new(parameters, &[play], (input, OutputBoundary::Arm), 5e-4);
+        for step in 1..=60 {
+            run.until(5e-4 * f64::from(step), |_| StepInput { external_torque_nm: 0.6, ..duty(0.0) });
+            let [f1, f2, f3, f4] = run.tensions_n();
+            assert!((f1 - f3).abs() < 1e-9, "{}: {f1} and {f3} N", play.descriptor().id);
+            // The sheaths alone hold the arm back.
+            assert!(f2 < f4 || run.plant.omega_out_rad_s() <= 0.0, "{f2} and {f4} N");
+        }
+        assert!(run.plant.theta_out_rad() > 0.02, "{} rad", run.plant.theta_out_rad());
+    }
+}

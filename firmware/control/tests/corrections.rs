@@ -213,12 +213,26 @@ fn dry_friction_of_the_joint_is_made_up_for() {
         check_crawl(friction, on);
     }
     for torque_nm in [0.05_f32, 0.1] {
-        let friction = effect("joint_coulomb_friction", &[("torque_nm", torque_nm.into())]);
+        let friction = |presliding_rad: f64| {
+            let parameters = [("torque_nm", torque_nm.into()), ("presliding_rad", presliding_rad)];
+            effect("joint_coulomb_friction", &parameters)
+        };
         let on = |parameters: &mut Parameters| {
             let own = &mut parameters.correction.joint_friction;
             (own.enable, own.coulomb) = (1.0, torque_nm);
         };
-        check(friction, on, Mode::Torque, &pulls());
+        // A fiftieth of a milliradian is all or none.
+        check(friction(2e-5), on, Mode::Torque, &pulls());
+        // Where friction gives way, the arm of a slow sine hangs just where little friction is overcome, and the correction gains less.
+        let [triangle, sine] = pulls();
+        check(friction(5e-4), on, Mode::Torque, &[triangle]);
+        let errors = errors(friction(5e-4), &on, Mode::Torque, sine);
+        if torque_nm > 0.05 {
+            judge(errors, "0.1 N·m that gives way");
+        } else {
+            let [_, before, after] = errors;
+            assert!(after < 0.7 * before, "{torque_nm} N·m: {after} after {before}");
+        }
     }
 }
 

@@ -1,15 +1,20 @@
-//! Dry friction of the joint: a constant torque that opposes motion.
+//! Dry friction of the joint: a constant torque `τ_c` that opposes motion.
 
-use crate::effect::{Component, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, ParameterSpec};
+use crate::effect::{
+    Component, Descriptor, Effect, EffectState, JointPort, MAX_PARAMETERS, PRESLIDING, ParameterSpec,
+};
 
-/// Dry friction of the joint: a constant torque that opposes motion.
+/// Dry friction of the joint: a constant torque `τ_c` that opposes motion.
 pub struct JointCoulombFriction;
 
 static DESCRIPTOR: Descriptor = Descriptor {
     id: "joint_coulomb_friction",
     component: Component::Joint,
     summary: "dry friction in the joint",
-    parameters: &[ParameterSpec::linear("torque_nm", "N·m", [0.0, 20.0], 0.05, "friction torque")],
+    parameters: &[
+        ParameterSpec::linear("torque_nm", "N·m", [0.0, 20.0], 0.05, "friction torque"),
+        PRESLIDING,
+    ],
     neutral: Some(0.0),
     channels: &[],
 };
@@ -21,5 +26,6 @@ impl Effect for JointCoulombFriction {
 
     fn joint(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut JointPort) {
         port.coulomb_nm += p[0];
+        port.presliding_rad = p[1];
     }
 }

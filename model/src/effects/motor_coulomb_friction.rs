@@ -1,7 +1,7 @@
 //! Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
 
 use crate::effect::{
-    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING_RAD, ParameterSpec,
+    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING, ParameterSpec,
 };
 
 /// Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
@@ -13,13 +13,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
     summary: "dry friction in motor or gear",
     parameters: &[
         ParameterSpec::linear("torque_nm", "N·m", [0.0, 20.0], 0.08, "friction torque at the input pulley"),
-        ParameterSpec::log(
-            "presliding_rad",
-            "rad",
-            [1e-4, 3e-2],
-            PRESLIDING_RAD,
-            "turn over which it builds up after a reversal",
-        ),
+        PRESLIDING,
     ],
     neutral: Some(0.0),
     channels: &[],

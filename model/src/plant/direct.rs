@@ -5,7 +5,7 @@ use super::joint::Joint;
 use super::motor::{self, Motor};
 use super::spindle::Spindle;
 use super::step_input::Step;
-use crate::drive::{after_dry_friction_rad_s, after_elastic_friction_rad_s, pulley_inertia_kg_m2};
+use crate::drive::{after_elastic_friction_rad_s, pulley_inertia_kg_m2};
 use crate::effect_set::EffectStates;
 use crate::load::{inertia_kg_m2, weight_nm};
 use crate::parameters::LoadParameters;
@@ -41,7 +41,8 @@ pub(super) fn step(
     let driven = (inertia * motor.omega_rad_s + dt_s * torque_nm) / slowed;
     let friction = [port.coulomb_nm, port.presliding_rad];
     let rubbed = after_elastic_friction_rad_s(&mut motor.presliding, driven, friction, slowed, dt_s);
-    let omega_rad_s = after_dry_friction_rad_s(rubbed, at_joint.coulomb_nm, slowed, dt_s);
+    let friction = [at_joint.coulomb_nm, at_joint.presliding_rad];
+    let omega_rad_s = after_elastic_friction_rad_s(&mut joint.presliding, rubbed, friction, slowed, dt_s);
     turn(motor, spindle, joint, [motor.theta_rad + dt_s * omega_rad_s, omega_rad_s]);
 }
 

@@ -2,17 +2,14 @@
 
 use super::config::{OutputBoundary, PlantConfig};
 use super::step_input::Step;
-use crate::drive::after_dry_friction_rad_s;
-use crate::effect::{Component, JointPort};
+use crate::drive::after_elastic_friction_rad_s;
+use crate::effect::{Component, JointPort, PRESLIDING_RAD};
 use crate::effect_set::EffectStates;
 use crate::load::{inertia_kg_m2, weight_nm};
 use crate::parameters::LoadParameters;
+use crate::play::Play;
 use crate::sheath::End;
 use crate::transmission::{Outside, Transmission, TransmissionConfig};
-
-/// Part of the closing speed that arm and output pulley lose when a play of the joint closes. Steel on steel keeps about
-/// half; without any loss the arm would bounce for seconds, which no bench does.
-const IMPACT_LOSS: f64 = 0.5;
 
 /// Joint with its load.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,14 +18,16 @@ pub(super) struct Joint {
     pub theta_rad: f64,
     /// Speed, rad/s.
     pub omega_rad_s: f64,
-    /// How far the output pulley leads the arm, rad.
-    offset_rad: f64,
+    /// Part of the dry friction that acts, -1 to 1.
+    pub presliding: f64,
+    /// Of the output pulley before the arm.
+    play: Play,
 }
 
 impl Joint {
     /// At rest in the middle of the play.
     pub const fn at_rest(theta_rad: f64) -> Self {
-        Self { theta_rad, omega_rad_s: 0.0, offset_rad: 0.0 }
+        Self { theta_rad, omega_rad_s: 0.0, presliding: 0.0, play: Play::CENTRED }
     }
 
     /// What effects say of the joint.
@@ -42,6 +41,7 @@ impl Joint {
             mass_kg,
             torque_nm: 0.0,
             coulomb_nm: 0.0,
+            presliding_rad: PRESLIDING_RAD,
             play_rad: 0.0,
         };
         if step.config.effects.touches(Component::Joint) {
@@ -66,11 +66,12 @@ impl Joint {
             self.theta_rad = input.theta_out_rad;
             self.omega_rad_s = delta_rad / dt_s;
             cables.turn_output(parts, delta_rad);
+            cables.close_play(parts);
             return;
         }
         let load = config.parameters.load.unwrap_or(LoadParameters::NONE);
         let port = self.port(step, states, load.mass_kg);
-        let inside_play = self.offset_rad.abs() < 0.5 * port.play_rad;
+        let inside_play = self.play.is_open(port.play_rad) || cables.inside_play();
         // A joint without inertia cannot ring; there the speed of the last correction would only feed back into the next.
         let loss_nm = if inside_play || config.output == OutputBoundary::Torque {
             0.0
@@ -82,41 +83,32 @@ impl Joint {
             let torque_nm = cable_nm + outside_nm;
             let inertia = inertia_kg_m2(&load, port.mass_kg);
             let weight_nm = weight_nm(&load, port.mass_kg, self.theta_rad);
-            let driven = self.omega_rad_s + dt_s * (torque_nm + weight_nm) / inertia;
-            let dry = after_dry_friction_rad_s(driven, port.coulomb_nm, inertia, dt_s);
-            self.omega_rad_s = dry / (1.0 + dt_s * load.viscous_nm_s_per_rad / inertia);
+            // Viscous friction at the end of the step counts like inertia.
+            let slowed = inertia + dt_s * load.viscous_nm_s_per_rad;
+            let driven = (inertia * self.omega_rad_s + dt_s * (torque_nm + weight_nm)) / slowed;
+            let friction = [port.coulomb_nm, port.presliding_rad];
+            self.omega_rad_s =
+                after_elastic_friction_rad_s(&mut self.presliding, driven, friction, slowed, dt_s);
             let delta_rad = dt_s * self.omega_rad_s;
             self.theta_rad += delta_rad;
-            cables.turn_output(parts, delta_rad);
+            // An arm that goes back lets the pulley lead. The pulley has no inertia, so that the arm loses no speed where the play
+            // closes; what a rebound loses goes into sheaths and ropes.
+            cables.turn_output(parts, -self.play.turn(-delta_rad, port.play_rad));
         } else {
+            // What is balanced are cables whose input end has settled.
+            cables.close_play(parts);
             let before_rad = self.theta_rad;
             let drag_nm_per_rad = load.viscous_nm_s_per_rad / dt_s;
-            self.balance(cables, parts, outside_nm, port.coulomb_nm, drag_nm_per_rad);
+            let friction = [port.coulomb_nm, port.presliding_rad];
+            self.balance(cables, parts, outside_nm, friction, drag_nm_per_rad);
             self.omega_rad_s = (self.theta_rad - before_rad) / dt_s;
         }
-        if port.play_rad > 0.0 || self.offset_rad != 0.0 {
-            self.close_play(cables, parts, port.play_rad, omega_in_rad_s);
-        }
+        cables.close_play(parts);
+        self.play = cables.relax_play(parts, End::Output, Outside::NOTHING, self.play, port.play_rad);
     }
 
-    /// Lets the output pulley move inside the play of the joint, and takes the loss of an impact where the play closes.
-    fn close_play(
-        &mut self,
-        cables: &mut Transmission,
-        parts: &TransmissionConfig,
-        play_rad: f64,
-        omega_in_rad_s: f64,
-    ) {
-        let before = self.offset_rad.abs();
-        self.offset_rad = cables.relax_play(parts, End::Output, Outside::NOTHING, self.offset_rad, play_rad);
-        let half = 0.5 * play_rad;
-        if self.offset_rad.abs() >= half && before < half {
-            let closing_rad_s = parts.pulley_ratio() * omega_in_rad_s - self.omega_rad_s;
-            self.omega_rad_s += IMPACT_LOSS * closing_rad_s;
-        }
-    }
-
-    /// Turns a joint without inertia until the cables balance load and friction, `drag_nm_per_rad` for the turn taken.
+    /// Turns a joint without inertia until the cables balance load and friction: dry friction of `level_nm` that builds up over
+    /// `travel_rad`, and `drag_nm_per_rad` for the turn taken.
     ///
     /// Newton steps on the torque. Along a turn the cables only soften, so that the slope of the last turn falls short
     /// rather than beyond; a turn that begins takes the slope of cables that stick everywhere, because the one from
@@ -126,7 +118,7 @@ impl Joint {
         cables: &mut Transmission,
         parts: &TransmissionConfig,
         outside_nm: f64,
-        coulomb_nm: f64,
+        [level_nm, travel_rad]: [f64; 2],
         drag_nm_per_rad: f64,
     ) {
         /// Newton steps at most; what is left then is taken up by the next simulation step.
@@ -136,16 +128,19 @@ impl Joint {
         /// Longest single turn, rad: a step across free play.
         const LONGEST_RAD: f64 = 0.1;
         let sticking = parts.sticking_stiffness_nm_per_rad(End::Output);
+        let before = self.presliding;
         let (mut turned_rad, mut last_rad) = (0.0, 0.0);
         for _ in 0..STEPS {
+            let rubbing = before + turned_rad / travel_rad;
+            self.presliding = rubbing.clamp(-1.0, 1.0);
             let torque_nm = cables.torque_out_nm(parts) + outside_nm - drag_nm_per_rad * turned_rad;
-            if torque_nm.abs() <= coulomb_nm {
-                break;
-            }
-            let excess_nm = torque_nm - coulomb_nm.copysign(torque_nm);
+            let excess_nm = torque_nm - level_nm * self.presliding;
             let goes_on = excess_nm * last_rad > 0.0;
             let stiffness = if goes_on { cables.stiffness_nm_per_rad(parts, End::Output) } else { sticking };
-            let delta_rad = (excess_nm / (stiffness + drag_nm_per_rad)).clamp(-LONGEST_RAD, LONGEST_RAD);
+            let slides = rubbing.copysign(rubbing * excess_nm) >= 1.0;
+            let rubbing_nm_per_rad = if slides { 0.0 } else { level_nm / travel_rad };
+            let slope = stiffness + rubbing_nm_per_rad + drag_nm_per_rad;
+            let delta_rad = (excess_nm / slope).clamp(-LONGEST_RAD, LONGEST_RAD);
             last_rad = delta_rad;
             self.theta_rad += delta_rad;
             cables.turn_output(parts, delta_rad);

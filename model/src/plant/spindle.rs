@@ -4,7 +4,7 @@ use super::motor;
 use super::step_input::Step;
 use crate::effect::MotorPort;
 use crate::effect_set::EffectStates;
-use crate::parameters::MotorParameters;
+use crate::play::Play;
 use crate::sheath::End;
 use crate::transmission::{Outside, Transmission, TransmissionConfig};
 
@@ -19,8 +19,8 @@ pub(super) struct Spindle {
     pub inside_gear_play: bool,
     /// Friction in the bearings of a spindle that is turned from outside, N·m.
     pub friction_nm: f64,
-    /// How far the rotor leads, rad.
-    gear_offset_rad: f64,
+    /// Of the rotor before the pulley.
+    gear_play: Play,
     /// Part of that friction that acts, -1 to 1.
     presliding: f64,
 }
@@ -33,15 +33,15 @@ impl Spindle {
             omega_rad_s: 0.0,
             inside_gear_play: false,
             friction_nm: 0.0,
-            gear_offset_rad: 0.0,
+            gear_play: Play::CENTRED,
             presliding: 0.0,
         }
     }
 
-    /// Torque of the cables on the rotor, N·m: none inside the play.
+    /// Torque of the cables on the rotor, N·m: none inside a play of gear or pulley.
     #[inline]
     pub fn load_nm(&self, cables: &Transmission, parts: &TransmissionConfig, omega_out_rad_s: f64) -> f64 {
-        if self.inside_gear_play {
+        if self.inside_gear_play || cables.inside_play() {
             0.0
         } else {
             -cables.torque_in_nm(parts)
@@ -55,24 +55,42 @@ impl Spindle {
         &mut self,
         step: &Step,
         (cables, parts): (&mut Transmission, &TransmissionConfig),
-        motor: &MotorParameters,
-        port: &MotorPort,
+        play_rad: f64,
         [theta_motor_rad, delta_rad]: [f64; 2],
     ) {
-        cables.turn_input(parts, delta_rad);
-        if port.gear_play_rad > 0.0 || self.gear_offset_rad != 0.0 {
-            let drag = motor.viscous_nm_s_per_rad * port.drag_behind_play / step.dt_s;
-            let loose = Outside {
-                torque_nm: step.input.loose_pulley.torque_nm - drag * delta_rad,
-                stiffness_nm_per_rad: step.input.loose_pulley.stiffness_nm_per_rad + drag,
-            };
-            self.gear_offset_rad =
-                cables.relax_play(parts, End::Input, loose, self.gear_offset_rad, port.gear_play_rad);
+        let turn_rad = self.gear_play.turn(delta_rad, play_rad);
+        cables.turn_input(parts, turn_rad);
+        self.theta_rad = theta_motor_rad - self.gear_play.lead_rad;
+        if !self.inside_gear_play {
+            self.omega_rad_s = turn_rad / step.dt_s;
         }
-        self.inside_gear_play = self.gear_offset_rad.abs() < 0.5 * port.gear_play_rad;
-        let before = self.theta_rad;
-        self.theta_rad = theta_motor_rad - self.gear_offset_rad;
-        self.omega_rad_s = (self.theta_rad - before) / step.dt_s;
+    }
+
+    /// Lets the pulley, which stood at `before_rad`, move inside a play of the gear, once rotor and joint have turned.
+    #[inline]
+    pub fn close_gear_play(
+        &mut self,
+        step: &Step,
+        (cables, parts): (&mut Transmission, &TransmissionConfig),
+        port: &MotorPort,
+        before_rad: f64,
+    ) {
+        if !self.gear_play.is_there(port.gear_play_rad) {
+            self.inside_gear_play = false;
+            return;
+        }
+        let viscous = step.config.parameters().motor.map_or(0.0, |motor| motor.viscous_nm_s_per_rad);
+        let drag_nm_per_rad = viscous * port.drag_behind_play / step.dt_s;
+        let turned_rad = self.theta_rad - before_rad;
+        let loose = Outside {
+            torque_nm: step.input.loose_pulley.torque_nm - drag_nm_per_rad * turned_rad,
+            stiffness_nm_per_rad: step.input.loose_pulley.stiffness_nm_per_rad + drag_nm_per_rad,
+        };
+        let before = self.gear_play;
+        self.gear_play = cables.relax_play(parts, End::Input, loose, before, port.gear_play_rad);
+        self.inside_gear_play = self.gear_play.is_open(port.gear_play_rad);
+        self.theta_rad -= self.gear_play.lead_rad - before.lead_rad;
+        self.omega_rad_s = (self.theta_rad - before_rad) / step.dt_s;
     }
 
     /// Turns as prescribed; returns by how much, rad.

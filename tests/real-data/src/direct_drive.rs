@@ -85,7 +85,9 @@ impl Physics {
         if matches!(self, Self::Dry | Self::DryAndViscous)
             && let Some(effect) = find("joint_coulomb_friction")
         {
-            model.effects.push(ActiveEffect::with_defaults(effect).with("torque_nm", 0.1));
+            // The published model of this actuator has dry friction that is all or none; a tenth of a milliradian is the least there is.
+            let dry = ActiveEffect::with_defaults(effect).with("torque_nm", 0.1).with("presliding_rad", 1e-4);
+            model.effects.push(dry);
         }
     }
 
