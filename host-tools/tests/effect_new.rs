@@ -71,6 +71,7 @@ fn the_effect_does_what_the_law_did() {
         mass_kg: 1.0,
         torque_nm: 0.0,
         coulomb_nm: 0.0,
+        presliding_rad: 5e-4,
         play_rad: 0.0,
     };
     oil.joint(&descriptor.defaults(), &mut [0.0; MAX_STATE], &mut port);

@@ -368,6 +368,12 @@ pub trait Effect: Sync {
         None
     }
 
+    /// Part of a sheath's length beside each pulley that is straight, when the simulation is set up.
+    fn straight_share(&self, parameters: &[f64; MAX_PARAMETERS]) -> f64 {
+        let _ = parameters;
+        0.0
+    }
+
     /// Changes what drives the winding.
     fn drive(&self, parameters: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut DrivePort) {
         let _ = (parameters, state, port);

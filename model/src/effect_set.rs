@@ -83,6 +83,12 @@ impl EffectSet {
         self.iter().filter_map(|active| active.effect.friction_law()).last().unwrap_or(nominal)
     }
 
+    /// Part of a sheath's length beside each pulley that is straight, by the effect that says most of it.
+    #[must_use]
+    pub fn straight_share(&self) -> f64 {
+        self.iter().map(|active| active.effect.straight_share(&active.parameters)).fold(0.0, f64::max)
+    }
+
     fn for_each(
         &self,
         component: Component,

@@ -29,6 +29,7 @@ mod sensor_offset;
 mod sensor_saturation;
 mod sheath_stribeck_friction;
 mod sheath_viscous_friction;
+mod straight_ends;
 mod tendon_creep;
 mod tendon_slack;
 mod tendon_stiffening;
@@ -65,6 +66,7 @@ use sensor_offset::SensorOffset;
 use sensor_saturation::SensorSaturation;
 use sheath_stribeck_friction::SheathStribeckFriction;
 use sheath_viscous_friction::SheathViscousFriction;
+use straight_ends::StraightEnds;
 use tendon_creep::TendonCreep;
 use tendon_slack::TendonSlack;
 use tendon_stiffening::TendonStiffening;
@@ -74,7 +76,7 @@ use wrap_angle_disturbed::WrapAngleDisturbed;
 use wrap_angle_varies_with_pose::WrapAngleVariesWithPose;
 
 /// All effects, input to output.
-pub static CATALOGUE: [&dyn Effect; 34] = [
+pub static CATALOGUE: [&dyn Effect; 35] = [
     &MotorCoulombFriction,
     &MotorViscousFriction,
     &MotorStribeckFriction,
@@ -97,6 +99,7 @@ pub static CATALOGUE: [&dyn Effect; 34] = [
     &TendonCreep,
     &PretensionLoss,
     &TransmissionBacklash,
+    &StraightEnds,
     &JointCoulombFriction,
     &JointViscousFriction,
     &JointBacklash,

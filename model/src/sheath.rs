@@ -139,6 +139,29 @@ impl TendonMesh {
         Ok(Self { elements, compliance_m_per_n, wrap_share, uniform: false, total_compliance_m_per_n })
     }
 
+    /// Mesh of a tendon of end-to-end stiffness `EA/L` \[N/m\] in a sheath that is straight over `share` of its length beside each
+    /// pulley and bent evenly between. A contact has the part of the wrap angle that lies in its part of the length, so
+    /// that what is simulated follows the share without steps.
+    ///
+    /// # Errors
+    /// [`SheathError`] when a number is out of range; `share` is in `[0, 0.5)`.
+    pub fn with_straight_ends(
+        elements: usize,
+        stiffness_n_per_m: f64,
+        share: f64,
+    ) -> Result<Self, SheathError> {
+        let bent = 1.0 - 2.0 * share;
+        if !(share >= 0.0 && bent > 0.0) {
+            return Err(SheathError::NotPositive { name: "bent share of the sheath", got: bent });
+        }
+        let mut mesh = Self::with_curvature(elements, stiffness_n_per_m, |_| 1.0)?;
+        for (contact, wrap_share) in mesh.wrap_share.iter_mut().take(elements).enumerate() {
+            let [from, to] = [contact, contact + 1].map(|border| border as f64 / elements as f64);
+            *wrap_share = (to.min(1.0 - share) - from.max(share)).max(0.0) / bent;
+        }
+        Ok(mesh)
+    }
+
     /// Number of contacts.
     #[must_use]
     pub const fn elements(&self) -> usize {

@@ -66,6 +66,20 @@ impl TransmissionConfig {
         self
     }
 
+    /// The same pair in sheaths that are straight over `share` of their length beside each pulley. Friction on one contact in the
+    /// middle stays there.
+    ///
+    /// # Errors
+    /// [`SheathError`] when the share is not in `[0, 0.5)`.
+    pub fn with_straight_ends(self, share: f64) -> Result<Self, SheathError> {
+        let elements = self.mesh.elements();
+        if share == 0.0 || elements == 1 {
+            return Ok(self);
+        }
+        let stiffness_n_per_m = 1.0 / self.mesh.total_compliance_m_per_n();
+        Ok(self.with_mesh(TendonMesh::with_straight_ends(elements, stiffness_n_per_m, share)?))
+    }
+
     /// Mesh of both tendons.
     #[must_use]
     pub const fn mesh(&self) -> &TendonMesh {

@@ -13,12 +13,13 @@ use random::Random;
 const STIFFNESS_N_PER_M: f64 = 72_900.0;
 const PRETENSION_N: f64 = 30.0;
 
-/// Even curvature and one that doubles along the sheath with a straight piece in the middle.
-fn meshes(n: usize) -> [TendonMesh; 2] {
+/// Even curvature, one that doubles along the sheath with a straight piece in the middle, and straight ends.
+fn meshes(n: usize) -> [TendonMesh; 3] {
     let bends = |s: f64| if (s - 0.5).abs() < 0.1 { 0.0 } else { 1.0 + s };
     [
         TendonMesh::uniform(n, STIFFNESS_N_PER_M).unwrap(),
         TendonMesh::with_curvature(n, STIFFNESS_N_PER_M, bends).unwrap(),
+        TendonMesh::with_straight_ends(n, STIFFNESS_N_PER_M, 0.14).unwrap(),
     ]
 }
 
@@ -166,4 +167,21 @@ fn impossible_meshes_are_refused() {
     assert!(TendonMesh::uniform(4, f64::NAN).is_err());
     let straight = SheathError::NotPositive { name: "integral of the curvature", got: 0.0 };
     assert_eq!(TendonMesh::with_curvature(4, 1.0, |_| 0.0), Err(straight));
+}
+
+/// A tendon that is pulled by little is as stiff as the length up to the first contact that holds it: a straight quarter and half
+/// of an element of sixteen, 16/4.5 times the stiffness from end to end.
+#[test]
+fn a_straight_end_is_stretched_before_any_contact_slips() {
+    let mesh = TendonMesh::with_straight_ends(16, STIFFNESS_N_PER_M, 0.25).unwrap();
+    let limits = SlipLimits::new(&mesh, 0.377, 0.0);
+    for end in [End::Input, End::Output] {
+        let mut tendon = Tendon::at_rest(&mesh, PRETENSION_N);
+        tendon.move_end(&mesh, &limits, end, 1e-7, false);
+        let rise_n = tendon.end_tension_n(&mesh, end) - PRETENSION_N;
+        near("rise", rise_n, 1e-7 * STIFFNESS_N_PER_M * 16.0 / 4.5, 1e-9);
+    }
+    for share in [-0.1, 0.5, f64::NAN] {
+        assert!(TendonMesh::with_straight_ends(16, STIFFNESS_N_PER_M, share).is_err());
+    }
 }

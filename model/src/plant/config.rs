@@ -93,13 +93,16 @@ impl PlantConfig {
         output: OutputBoundary,
     ) -> Result<Self, PlantError> {
         let transmission = match (parameters.tendon, parameters.pulleys) {
-            (Some(tendon), Some(pulleys)) => Some(TransmissionConfig::new(
-                pulleys,
-                tendon,
-                parameters.sheath,
-                effects.friction_law(parameters.friction),
-                elements,
-            )?),
+            (Some(tendon), Some(pulleys)) => Some(
+                TransmissionConfig::new(
+                    pulleys,
+                    tendon,
+                    parameters.sheath,
+                    effects.friction_law(parameters.friction),
+                    elements,
+                )?
+                .with_straight_ends(effects.straight_share())?,
+            ),
             (Some(_), None) => return Err(PlantError::PulleysMissing),
             (None, _) => None,
         };

@@ -44,6 +44,7 @@ static EFFECTS_ON_BOARD: [(&str, OnBoard); CATALOGUE.len()] = [
     ("tendon_creep", NotUsed(CHANGES_WITH_TIME)),
     ("pretension_loss", NotUsed("a loss is for the bench: restore the pretension")),
     ("transmission_backlash", Carried(corrections::transmission_backlash)),
+    ("straight_ends", NotUsed("the compensator knows the wrap angle of a sheath and not where it bends")),
     ("joint_coulomb_friction", Carried(corrections::joint_coulomb)),
     ("joint_viscous_friction", NotUsed("the board does not feed viscous friction of the joint forward")),
     ("joint_backlash", Carried(corrections::joint_backlash)),
