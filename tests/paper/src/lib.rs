@@ -13,6 +13,7 @@
 //! | [`lubrication_and_radius`] | section 4.1, Fig. 5 to 8 |
 //! | [`efficiency`] | section 4.2, Fig. 9 |
 //! | [`sheath_motion`] | the sheaths moved at random |
+//! | [`sheath_steps`] | the sheaths swung to and fro by pi |
 //! | [`tracking_error`] | average torque tracking error, position error |
 //! | [`disturbed_tracking`] | section 5.2, Fig. 11 and 12: setup and runner |
 //! | [`beyond`] | the same with a controller that follows the friction of the sheaths |
@@ -37,6 +38,7 @@ pub mod page;
 pub mod plots;
 pub mod position;
 pub mod sheath_motion;
+pub mod sheath_steps;
 pub mod torque_phases;
 pub mod tracking_error;
 pub mod tracking_methods;

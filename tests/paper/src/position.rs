@@ -1,7 +1,7 @@
 //! Position mode while the sheaths are moved, beyond the paper: frequencies, loads, pretensions, wrong parameters.
 //!
 //! Everything runs on the default bench with default parameters that describe it ([`crate::driven_joint::parameters_of`]): nothing
-//! is tuned. K of both sheaths wanders as in section 5.2 ([`crate::sheath_motion`]). The error is that of the true joint angle against
+//! is tuned. K of both sheaths wanders as in section 5.2 ([`crate::sheath_motion`]) or goes by pi at once ([`crate::sheath_steps`]). The error is that of the true joint angle against
 //! the board's reference in the same tick; *turns* are the eighth of a period after each turn, where the dead zone is crossed. A
 //! slack event is a time in which a true tension is below `tension.slack`.
 
@@ -13,6 +13,7 @@ use virtual_bench::BenchConfig;
 use crate::driven_joint::{DrivenJoint, parameters_of};
 use crate::error::ExperimentError;
 use crate::sheath_motion::{SheathMotion, SheathMotionConfig};
+use crate::sheath_steps::SheathSteps;
 use crate::tracking_methods::Spread;
 
 /// Seeds that figures come from; they took part in no choice.
@@ -30,6 +31,15 @@ const SETTLING_S: f64 = 2.0;
 /// Part of a period after a turn that counts as the turn.
 const TURN: f64 = 0.125;
 
+/// How the sheaths are moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moved {
+    /// At random, as in section 5.2.
+    ByHand,
+    /// To and fro by pi within a fifth of a second.
+    BySteps,
+}
+
 /// A sine in position mode on a bench whose sheaths are moved.
 #[derive(Debug, Clone)]
 pub struct SineCase {
@@ -41,6 +51,8 @@ pub struct SineCase {
     pub amplitude_rad: f32,
     /// Frequency \[Hz\].
     pub frequency_hz: f32,
+    /// Motion of the sheaths.
+    pub moved: Moved,
 }
 
 /// What a sine shows.
@@ -90,7 +102,7 @@ impl SineCase {
         let mut parameters = parameters_of(&bench);
         change(&mut parameters);
         let amplitude_rad = accepted_amplitude_rad(&parameters, frequency_hz, most_rad);
-        Self { bench, parameters, amplitude_rad, frequency_hz }
+        Self { bench, parameters, amplitude_rad, frequency_hz, moved: Moved::ByHand }
     }
 
     /// One run; `seed` is that of the sheaths' motion and of the sensor noise.
@@ -99,7 +111,6 @@ impl SineCase {
     /// [`ExperimentError`] if the supervisor stops the joint or a parameter is out of range.
     pub fn run(&self, seed: u64) -> Result<SineFigures, ExperimentError> {
         let mut joint = DrivenJoint::ready(&self.bench, self.parameters.clone(), seed)?;
-        let motion = SheathMotion::new(SheathMotionConfig::BY_HAND, seed);
         let frequency_hz = f64::from(self.frequency_hz);
         joint.refer(Reference::Generated {
             shape: Shape::Sine,
@@ -112,12 +123,17 @@ impl SineCase {
         let periods = |seconds: f64| (seconds * frequency_hz).ceil() / frequency_hz;
         let start = (periods(SETTLING_S) * rate_hz).round() as u64;
         let end = start + (periods(MEASURED_S) * rate_hz).round() as u64;
+        let motion = SheathMotion::new(SheathMotionConfig::BY_HAND, seed);
+        let steps = SheathSteps::new(SheathMotionConfig::BY_HAND, end as f64 / rate_hz, seed);
         let mut all = Errors::default();
         let mut turns = Errors::default();
         let mut slack = SlackCount::new(self.parameters.tension.slack);
         for tick in 0..end {
             let time_s = tick as f64 / rate_hz;
-            joint.set_wrap_angle_rad(motion.wrap_angle_rad(time_s))?;
+            joint.set_wrap_angle_rad(match self.moved {
+                Moved::ByHand => motion.wrap_angle_rad(time_s),
+                Moved::BySteps => [steps.wrap_angle_rad(time_s); 2],
+            })?;
             let output = joint.tick()?;
             slack.look(&joint);
             if tick < start {
@@ -262,6 +278,12 @@ pub fn frequency_cases() -> Vec<SineCase> {
     let case =
         |change: fn(&mut Parameters), hz| SineCase::new(BenchConfig::default(), hz, AMPLITUDE_RAD, change);
     WAYS.iter().flat_map(|way| FREQUENCIES_HZ.map(|hz| case(way.change, hz))).collect()
+}
+
+/// All frequencies and ways on a bench whose sheaths go to and fro by pi, way by way.
+#[must_use]
+pub fn step_cases() -> Vec<SineCase> {
+    frequency_cases().into_iter().map(|case| SineCase { moved: Moved::BySteps, ..case }).collect()
 }
 
 /// Factors of `mu K` at the start, each at 0.1 and 0.5 Hz.

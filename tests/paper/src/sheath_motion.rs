@@ -65,7 +65,7 @@ impl SheathMotion {
     /// The motion of `seed`.
     #[must_use]
     pub fn new(config: SheathMotionConfig, seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let common = Course::new(&config, &mut random);
         let own = std::array::from_fn(|_| Course::new(&config, &mut random));
         Self { config, common, own }
@@ -84,11 +84,16 @@ impl SheathMotion {
 }
 
 /// `SplitMix64` (Steele, Lea, Flood 2014).
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
+    /// Equal seeds give equal numbers.
+    pub(crate) const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
     /// Uniform in 0..1.
-    fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use bowden_paper::position::{
-    PRETENSION_FACTORS, SineFigures, WAYS, frequency_cases, load_cases, pretension_cases, run_all,
+    PRETENSION_FACTORS, SineFigures, WAYS, frequency_cases, load_cases, pretension_cases, run_all, step_cases,
 };
 use bowden_paper::wrap_step::{Knowledge, STEP_LIMIT_S, StepCase};
 
@@ -54,6 +54,24 @@ fn encoders_and_current_alone_gain_at_every_frequency() {
         assert!(after.rms_rad < most * before.rms_rad, "{before:?} {after:?}");
         assert!(after.turn_rms_rad < before.turn_rms_rad, "{before:?} {after:?}");
     }
+}
+
+/// K goes by pi within a fifth of a second: nothing slackens, nothing stops, and what is known of K is still worth it.
+#[test]
+fn position_mode_bears_steps_of_the_wrap_angle() {
+    let cases = step_cases();
+    let [off, default] = [0, 2].map(|way| {
+        let own = &cases[way * cases.len() / WAYS.len()..];
+        own.iter().find(|case| case.frequency_hz == 0.5).expect("0.5 Hz").clone()
+    });
+    let rows = run_all(&[off, default], &[SEED]).expect("in range");
+    for row in &rows {
+        assert!(row.stopped.is_empty(), "{:?}", row.stopped);
+        println!("{:?}", row.figures[0]);
+        assert_eq!(row.figures[0].slack_events, 0, "{:?}", row.figures);
+    }
+    let [before, after] = [0, 1].map(|row| rows[row].figures[0]);
+    assert!(after.rms_rad < 0.5 * before.rms_rad, "{before:?} {after:?}");
 }
 
 /// Far from a turn of the reference within the goal, and not at once; ahead of a turn later, as the page says.

@@ -5,10 +5,12 @@ use std::fs;
 use std::path::Path;
 
 use crate::error::ExperimentError;
+use crate::position;
 use crate::position::{
     FREQUENCIES_HZ, MASSES_KG, PRETENSION_AMPLITUDE_RAD, PRETENSION_FACTORS, SEEDS, START_FACTORS, SineCase,
     SineRow, WAYS, frequency_cases, least_pretension_n, load_cases, pretension_cases, run_all, start_cases,
 };
+use crate::sheath_steps::{BETWEEN_S, SWING_S};
 use crate::tracking_methods::Spread;
 use crate::wrap_step::{Knowledge, STEP_BAND_NM, STEP_LIMIT_S, StepFigures, run_steps, step_cases};
 
@@ -51,6 +53,14 @@ pub fn sections(provenance: &str) -> Result<String, ExperimentError> {
     let cases = frequency_cases();
     let names = WAYS.iter().flat_map(|way| FREQUENCIES_HZ.map(|hz| format!("{} | {hz} Hz", way.name)));
     table(&mut text, "compensation | frequency", names, &cases)?;
+    let _ = write!(
+        text,
+        "\n### K steps by pi\n\n\
+         The same, but K of both sheaths goes from pi/2 to 3 pi/2 or back within {SWING_S} s, at random every {} to {} s.\n\n",
+        BETWEEN_S[0], BETWEEN_S[1]
+    );
+    let names = WAYS.iter().flat_map(|way| FREQUENCIES_HZ.map(|hz| format!("{} | {hz} Hz", way.name)));
+    table(&mut text, "compensation | frequency", names, &position::step_cases())?;
     text += "\n### `mu K` wrong at the start\n\n0.3 rad, default compensation.\n\n";
     let names =
         START_FACTORS.iter().flat_map(|factor| [0.1, 0.5].map(|hz| format!("{factor} of it | {hz} Hz")));
