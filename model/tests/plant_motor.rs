@@ -255,3 +255,56 @@ fn inside_a_play_nothing_holds_the_pulley() {
         assert!(run.plant.theta_out_rad() > 0.02, "{} rad", run.plant.theta_out_rad());
     }
 }
+
+/// Inside a play of the pulley the rotor turns as without cables, and an arm without friction of sheaths as without pulley.
+#[test]
+fn inside_a_play_of_the_pulley_rotor_and_arm_are_free() {
+    let play =
+        ActiveEffect::with_defaults(effects::find("transmission_backlash").unwrap()).with("gap_rad", 0.4);
+    let mut parameters = joint(0.0);
+    parameters.motor = Some(MOTOR);
+    let mut run = Run::new(parameters, &[play], MOTOR_AND_ARM, 5e-4);
+    let mut bare = Run::new(bare_motor(), &[], MOTOR_AND_ARM, 5e-4);
+    let pushed_nm = 0.5;
+    let (mut angle_rad, mut speed_rad_s) = (0.0_f64, 0.0_f64);
+    for step in 1..=30 {
+        let t_s = 5e-4 * f64::from(step);
+        run.until(t_s, |_| StepInput { external_torque_nm: pushed_nm, ..duty(0.1) });
+        bare.until(t_s, |_| duty(0.1));
+        let torque_nm = pushed_nm - WEIGHT_NM * angle_rad.sin() - 0.004 * speed_rad_s;
+        speed_rad_s += 5e-4 * torque_nm / INERTIA_KG_M2;
+        angle_rad += 5e-4 * speed_rad_s;
+        near("rotor", run.plant.theta_motor_rad(), bare.plant.theta_motor_rad(), 1e-12);
+        near("arm", run.plant.theta_out_rad(), angle_rad, 1e-4);
+    }
+    let lead_rad = run.plant.theta_motor_rad() - angle_rad;
+    assert!(angle_rad > 0.03 && lead_rad.abs() < 0.2, "{angle_rad} rad, {lead_rad} rad apart");
+}
+
+/// An arm that flies through the play of its joint leaves pulley and tendons where they are.
+#[test]
+fn inside_a_play_of_the_joint_the_pulley_waits() {
+    let play = ActiveEffect::with_defaults(effects::find("joint_backlash").unwrap()).with("gap_rad", 0.2);
+    let mut run = Run::new(joint(0.3), &[play], (InputBoundary::Angle, OutputBoundary::Arm), 5e-4);
+    let before_n = run.tensions_n();
+    run.plant.set_speed_rad_s(6.0);
+    for _ in 0..20 {
+        run.plant.step(&run.config, &IDLE, 5e-4);
+        assert_eq!(run.tensions_n(), before_n, "at {} rad", run.plant.theta_out_rad());
+    }
+    assert!(run.plant.theta_out_rad() > 0.05, "{} rad", run.plant.theta_out_rad());
+}
+
+/// Friction of the joint on a motor without tendons: ω = (k V/R - τ)/(b + k²/R).
+#[test]
+fn dry_friction_of_the_joint_slows_a_direct_drive() {
+    let dry =
+        ActiveEffect::with_defaults(effects::find("joint_coulomb_friction").unwrap()).with("torque_nm", 0.3);
+    for sign in [1.0, -1.0] {
+        let mut run = Run::new(bare_motor(), &[dry], MOTOR_AND_ARM, 5e-4);
+        run.until(20.0, |_| duty(sign));
+        let driving_nm = PULLEY_NM_PER_A * 24.0 / 2.0 - 0.3;
+        let drag = 0.02 + PULLEY_NM_PER_A * PULLEY_NM_PER_A / 2.0;
+        near("speed", sign * run.plant.omega_out_rad_s(), driving_nm / drag, 1e-9);
+    }
+}

@@ -76,7 +76,6 @@ impl Spindle {
         before_rad: f64,
     ) {
         if !self.gear_play.is_there(port.gear_play_rad) {
-            self.inside_gear_play = false;
             return;
         }
         let viscous = step.config.parameters().motor.map_or(0.0, |motor| motor.viscous_nm_s_per_rad);
