@@ -59,16 +59,17 @@ pub fn is_moment(spec: &ParameterSpec) -> bool {
     spec.unit == "s" && spec.scale == Scale::Linear
 }
 
-/// Size of the optimiser's coordinate of a law's rate: a wave that is a tenth faster is out of step after a few periods, and slopes
-/// over such a step tell nothing.
-fn rate_size(spec: &ParameterSpec, start: f64) -> f64 {
+/// Size of the optimiser's coordinate of a rate: a wave that is a tenth faster is out of step after a few periods, and slopes over such a
+/// step tell nothing.
+fn rate_size(spec: &ParameterSpec, start: f64, is_of_law: bool) -> f64 {
     /// Change of a frequency, Hz: a coarse step is a fifth of a period within the forty seconds of a usual recording.
     const FREQUENCY_HZ: f64 = 0.05;
-    /// Change of the periods in a turn.
-    const CYCLES: f64 = 4.0;
+    /// Change of the periods in a turn: of a law that is sought over the travel of a joint, and of what is locked to a pulley, which
+    /// may go round several times.
+    const CYCLES: [f64; 2] = [4.0, 1.0];
     match spec.name {
         "frequency_hz" => (FREQUENCY_HZ / start).min(1.0),
-        "cycles_per_turn" => (CYCLES / start).min(1.0),
+        "cycles_per_turn" => (CYCLES[usize::from(!is_of_law)] / start).min(1.0),
         _ => 1.0,
     }
 }
@@ -119,8 +120,7 @@ impl Free {
         let spec = *active.descriptor().parameters.get(parameter)?;
         let start = active.parameters[parameter];
         let size = match spec.scale {
-            Scale::Log if law::of(active).is_some() => rate_size(&spec, start),
-            Scale::Log => 1.0,
+            Scale::Log => rate_size(&spec, start, law::of(active).is_some()),
             Scale::Linear if spec.default != 0.0 => {
                 typical(model, active.descriptor().component, &spec).abs()
             }
