@@ -346,6 +346,11 @@ pub trait Effect: Sync {
         self.descriptor().neutral.is_some_and(|neutral| is_weak(parameters[0], neutral, usual))
     }
 
+    /// Parameter in which several instances of it on one part differ, a ratio of 5 % at least; `None` where a part has it once.
+    fn instances_differ_in(&self) -> Option<&'static str> {
+        None
+    }
+
     /// What to record so that it shows apart from others; `None` where what does so for its component is enough.
     fn told_apart_by(&self) -> Option<&'static str> {
         None
@@ -433,6 +438,13 @@ impl Target {
         }
     }
 
+    /// Whether a channel is meant by both; true of two without channels.
+    #[must_use]
+    pub fn overlaps(self, other: Self) -> bool {
+        self == other
+            || Channel::ALL.into_iter().any(|channel| self.includes(channel) && other.includes(channel))
+    }
+
     /// Name in files: a column role, or `tensions`; `None` where there is no channel.
     #[must_use]
     pub const fn name(self) -> Option<&'static str> {
@@ -471,6 +483,26 @@ impl ActiveEffect {
     #[must_use]
     pub fn descriptor(&self) -> &'static Descriptor {
         self.effect.descriptor()
+    }
+
+    /// Whether both are instances of one effect on one part.
+    #[must_use]
+    pub fn is_beside(&self, other: &Self) -> bool {
+        self.descriptor().id == other.descriptor().id && self.target.overlaps(other.target)
+    }
+
+    /// Whether a simulation cannot have both: instances of one effect on one part that do not differ where they should.
+    #[must_use]
+    pub fn excludes(&self, other: &Self) -> bool {
+        /// Ratio of the parameter in which two instances differ.
+        const APART: f64 = 1.05;
+        let differ = |name: &str| {
+            self.descriptor().index_of(name).is_some_and(|index| {
+                let (one, another) = (self.parameters[index], other.parameters[index]);
+                one.max(another) >= APART * one.min(another)
+            })
+        };
+        self.is_beside(other) && !self.effect.instances_differ_in().is_some_and(differ)
     }
 
     /// The same effect with one parameter set by name; unchanged when it has no such parameter.

@@ -9,7 +9,7 @@ use crate::effect::{
 use crate::friction_law::FrictionLaw;
 
 /// Largest number of effects in one simulation.
-pub const MAX_ACTIVE: usize = 12;
+pub const MAX_ACTIVE: usize = 16;
 
 /// More than [`MAX_ACTIVE`] effects were asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -352,7 +352,7 @@ impl Case<'_> {
         let shown = Shown::by(&training.iter().chain(heldout).copied().collect::<Vec<_>>());
         let bearable = Bearable { shown, allowed: self.allowed, scales: objective.scales() };
         let mut experiments = Vec::new();
-        let mut effects = Vec::new();
+        let mut effects: Vec<(ActiveEffect, NamedEffect)> = Vec::new();
         let mut laws = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
             let active = last.model.effects[own + index];
@@ -364,14 +364,20 @@ impl Case<'_> {
                 laws.push((stated_laws::stated(law, &active, losses, &last.stds[values]), active));
                 continue;
             }
+            if let Some((_, named)) = effects.iter_mut().find(|(other, _)| other.is_beside(&active)) {
+                named.further.push(estimates(&active, &last.stds[values]));
+                continue;
+            }
             let separate = |tried: &Tried| {
                 let found = experiment::separating(rig, chosen, tried, &bearable, clock_s)?;
                 let words = found.in_words();
                 experiments.push(found);
                 Some(words)
             };
-            effects.push(named(active, chosen, &last.stds[values], objective, separate));
+            effects.push((active, named(active, chosen, &last.stds[values], objective, separate)));
         }
+        let mut effects: Vec<NamedEffect> =
+            effects.into_iter().map(|(active, named)| strongest_first(&active, named)).collect();
         laws.extend(hums.iter().filter_map(|hum| Some((hum.stated()?, hum.law))));
         let mismatch = place::mismatch(objective, &stages.recalibrated.residuals);
         let unexplained = stated_laws::unexplained(&laws, unexplained, &mismatch);
@@ -471,19 +477,6 @@ fn named(
     let descriptor = active.descriptor();
     let improvement = 1.0 - chosen.loss_after / chosen.loss_before;
     let (probability, rivals) = words::rivals(chosen, improvement, separate);
-    let mut stds = stds.iter();
-    let parameters = descriptor
-        .parameters
-        .iter()
-        .zip(active.parameters)
-        .filter_map(|(spec, value)| {
-            let fitted = spec.searched;
-            let std = if fitted { *stds.next()? } else { None };
-            let at_bound = fitted && (value <= spec.lower || value >= spec.upper);
-            let estimate = Estimate { value, std, unit: spec.unit.to_owned(), at_bound };
-            (fitted || !spec.forms.is_empty()).then(|| (spec.name.to_owned(), estimate))
-        })
-        .collect();
     let onset_s = descriptor
         .parameters
         .iter()
@@ -495,11 +488,43 @@ fn named(
         probability,
         onset_s,
         channel: active.target.name().map(str::to_owned),
-        parameters,
+        parameters: estimates(&active, stds),
+        further: Vec::new(),
         heldout_improvement: improvement,
         sentence: words::sentence(&active, improvement, objective.duration_s()),
         rivals,
     }
+}
+
+/// Fitted parameters with their standard deviations.
+fn estimates(active: &ActiveEffect, stds: &[Option<f64>]) -> BTreeMap<String, Estimate> {
+    let mut stds = stds.iter();
+    let specs = active.descriptor().parameters.iter().zip(active.parameters);
+    specs
+        .filter_map(|(spec, value)| {
+            let fitted = spec.searched;
+            let std = if fitted { *stds.next()? } else { None };
+            let at_bound = fitted && (value <= spec.lower || value >= spec.upper);
+            let estimate = Estimate { value, std, unit: spec.unit.to_owned(), at_bound };
+            (fitted || !spec.forms.is_empty()).then(|| (spec.name.to_owned(), estimate))
+        })
+        .collect()
+}
+
+/// The same effect with the strongest of its instances in front, and a sentence that tells the others.
+fn strongest_first(active: &ActiveEffect, mut named: NamedEffect) -> NamedEffect {
+    if named.further.is_empty() {
+        return named;
+    }
+    let strength = active.descriptor().parameters[0].name;
+    let mut all = std::mem::take(&mut named.further);
+    all.push(std::mem::take(&mut named.parameters));
+    let size = |one: &BTreeMap<String, Estimate>| one.get(strength).map_or(0.0, |it| it.value.abs());
+    all.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    named.parameters = all.remove(0);
+    named.further = all;
+    named.sentence = words::sentence_of_instances(active, &named);
+    named
 }
 
 fn values_of(effect: &ActiveEffect) -> BTreeMap<String, f64> {

@@ -178,6 +178,27 @@ fn an_effect_on_the_same_sensor_is_replaced_and_on_another_stands_beside_it() {
     assert_eq!(document.to_string(), before);
 }
 
+/// A part has several harmonics of cogging; what is there is told by its periods, as a fit finds them anew.
+#[test]
+fn an_instance_of_an_effect_is_replaced_and_another_stands_beside_it() {
+    let harmonic = |cycles: f64, amplitude_nm: f64| {
+        with("motor_cogging", "cycles_per_turn", cycles, Target::None).with("amplitude_nm", amplitude_nm)
+    };
+    let mut document = document();
+    for one in [harmonic(7.0, 0.8), harmonic(28.0, 0.5), harmonic(12.0, 0.2), harmonic(28.1, 0.6)] {
+        document.add_effect(&one).unwrap();
+    }
+    let expected = [harmonic(7.0, 0.8), harmonic(28.1, 0.6), harmonic(12.0, 0.2)];
+    assert_eq!(document.rig().unwrap().effects, expected, "{document}");
+    let text = document.to_string().replace("cycles_per_turn = 12.0", "cycles_per_turn = 7.2");
+    let refused = Rig::parse(&text, "rig.toml").unwrap_err();
+    assert_eq!(refused.class(), FailureClass::BadInput);
+    assert!(
+        refused.message().ends_with("described twice; `cycles_per_turn` differs by 5 % at least"),
+        "{refused:?}"
+    );
+}
+
 #[test]
 fn channels_may_be_named_alone_as_a_list_or_as_tensions() {
     let targets = |channel: &str| -> Vec<Target> {

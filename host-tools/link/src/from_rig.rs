@@ -18,6 +18,7 @@ use std::fmt::Write;
 
 use bowden_core::outcome::Failure;
 use bowden_core::rig::Rig;
+use bowden_model::effect::ActiveEffect;
 use draft::Draft;
 
 use super::parameters::ParameterSet;
@@ -76,8 +77,15 @@ impl Transfer {
         let mut draft = Draft::new(parameters, recorded);
         let mut unused = nominal::carry(rig, &mut draft);
         // What a channel shows passes its effects in the order of the file; it is undone from the last one on.
-        let mut of_effects: Vec<Unused> =
-            rig.effects.iter().rev().filter_map(|active| effects::carry(active, &mut draft)).collect();
+        let (mut instances, others): (Vec<&ActiveEffect>, Vec<&ActiveEffect>) =
+            rig.effects.iter().rev().partition(|active| active.effect.instances_differ_in().is_some());
+        // The board has places for the strongest ones.
+        instances.sort_by(|a, b| a.parameters[0].abs().total_cmp(&b.parameters[0].abs()));
+        let mut of_effects: Vec<Unused> = others
+            .into_iter()
+            .chain(instances.into_iter().rev())
+            .filter_map(|active| effects::carry(active, &mut draft))
+            .collect();
         of_effects.reverse();
         unused.append(&mut of_effects);
         Ok(Self { changes: draft.changes(source)?, unused, limited: corrections::limited(&draft) })

@@ -141,6 +141,41 @@ fn a_rig_does_not_set_harmonics_that_the_table_stands_for() {
 }
 
 #[test]
+fn the_two_strongest_harmonics_of_a_rig_are_carried_and_the_third_is_told() {
+    let mut client = Client::connect(Box::new(SimTransport::new()), "sim", Duration::from_secs(1)).unwrap();
+    let harmonics = [(12.0, 0.1), (7.0, 0.3), (28.0, 0.2)];
+    let tables = harmonics.map(|(cycles, amplitude_nm)| {
+        format!(
+            "[[effects.motor_cogging]]\namplitude_nm = {amplitude_nm}\ncycles_per_turn = {cycles}\nphase_rad = 0.5\n"
+        )
+    });
+    let rig = Rig::parse(&rig("\"motor_cogging\"", &tables.concat()), "rig.toml").unwrap();
+    let set = ParameterSet::read(&mut client).unwrap();
+    let transfer = Transfer::new(&rig, "rig.toml", &set, &[]).unwrap();
+    let new = |name: &str| {
+        transfer
+            .changes
+            .iter()
+            .find(|change| change.name == format!("correction.cogging.{name}"))
+            .unwrap()
+            .new
+    };
+    assert_eq!([new("amplitude_1"), new("periods_1"), new("phase_1")], [0.3, 7.0, 0.5]);
+    assert_eq!([new("amplitude_2"), new("periods_2"), new("phase_2")], [0.2, 28.0, 0.5]);
+    let told: Vec<&str> = transfer
+        .unused
+        .iter()
+        .filter(|unused| unused.source == "effects.motor_cogging")
+        .map(|unused| unused.reason.as_str())
+        .collect();
+    let [one] = told[..] else { panic!("{told:?}") };
+    assert!(
+        one.starts_with("the board takes the two strongest harmonics, 12.0 periods a turn are not"),
+        "{one}"
+    );
+}
+
+#[test]
 fn the_command_shows_and_writes_and_a_dry_run_only_shows() {
     let folder = tempfile::tempdir().unwrap();
     // 0.125 at the largest of 1024 rows.

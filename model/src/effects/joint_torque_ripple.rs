@@ -30,6 +30,10 @@ impl Effect for JointTorqueRipple {
         Starts::LockedTo(Channel::ThetaOut)
     }
 
+    fn instances_differ_in(&self) -> Option<&'static str> {
+        Some("cycles_per_turn")
+    }
+
     fn on_request(&self) -> bool {
         true
     }

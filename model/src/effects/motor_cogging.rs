@@ -36,6 +36,10 @@ impl Effect for MotorCogging {
         Starts::LockedTo(Channel::ThetaIn)
     }
 
+    fn instances_differ_in(&self) -> Option<&'static str> {
+        Some("cycles_per_turn")
+    }
+
     fn told_apart_by(&self) -> Option<&'static str> {
         Some("one slow turn at constant speed in each direction with the tendons at low pretension")
     }

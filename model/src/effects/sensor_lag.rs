@@ -29,7 +29,7 @@ impl Effect for SensorLag {
     }
 
     fn starts(&self) -> Starts {
-        Starts::At("time_constant_s", &[0.01, 0.05])
+        Starts::At("time_constant_s", &[0.01, 0.05, 0.2])
     }
 
     fn is_shared_by_tensions(&self) -> bool {

@@ -73,6 +73,11 @@ pub fn said(diagnosis: &Diagnosis) -> String {
             effect.probability,
             values.join(", ")
         ));
+        for instance in &effect.further {
+            let values: Vec<String> =
+                instance.iter().map(|(name, value)| format!("{name} {:.4}", value.value)).collect();
+            lines.push(format!("    and {}", values.join(", ")));
+        }
     }
     if let Some(unexplained) = &diagnosis.unexplained {
         lines.push(format!("  unexplained: {}", unexplained.sentence));

@@ -87,6 +87,30 @@ fn the_current_of_a_cogging_motor_is_predicted_from_its_angle() {
     assert_ne!(fit(&compensated, &maps, &recordings.harmonics, Physics::Lag), fitted);
 }
 
+/// `bowden diagnose` from a rig file without any effect: what the fit above has, but for the offset that dry friction is in turns of one
+/// direction.
+#[test]
+fn the_harmonics_of_a_cogging_motor_and_its_late_current_are_named() {
+    let Some(data) = data(cogging_motor::FOLDER) else { return };
+    let [case, ..] = cogging_motor::diagnosed_cases();
+    let diagnosis = case.diagnose(&data.join(cogging_motor::FOLDER)).unwrap();
+    println!("{}", bowden_real_data::diagnosed::said(&diagnosis));
+    let fit = &diagnosis.fit.channels["torque_in_nm"];
+    // The rig file states a noise of 0.01 A.
+    assert!(fit.after_rmse < 0.05 && fit.after_rmse > 0.01, "{fit:?}");
+    let named = |id: &str| diagnosis.effects.iter().find(|effect| effect.id == id).unwrap();
+    let cogging = named("motor_cogging");
+    let harmonics = || std::iter::once(&cogging.parameters).chain(&cogging.further);
+    for cycles in [7.0, 28.0, 14.0, 36.0, 12.0] {
+        let near = |found: f64| (found / cycles - 1.0).abs() < 0.02;
+        assert!(harmonics().any(|one| near(one["cycles_per_turn"].value)), "{cycles}: {cogging:?}");
+    }
+    assert!(harmonics().count() >= 6, "{cogging:?}");
+    let lag = named("sensor_lag");
+    assert_eq!(lag.channel.as_deref(), Some("torque_in_nm"));
+    assert!((0.08..0.14).contains(&lag.parameters["time_constant_s"].value), "{lag:?}");
+}
+
 #[test]
 fn a_quasi_direct_drive_swings_as_its_reported_torque_says() {
     use direct_drive::{Physics, SWING_UP, Taken, errors_rad, load, models, shown};

@@ -50,10 +50,10 @@ pub fn candidates(
             continue;
         }
         for target in targets(model, effect) {
-            let contained = model.effects.iter().any(|active| {
-                active.descriptor().id == descriptor.id
-                    && (target == Target::None || overlaps(active.target, target))
-            });
+            let contained = model
+                .effects
+                .iter()
+                .any(|active| active.descriptor().id == descriptor.id && active.target.overlaps(target));
             if contained {
                 continue;
             }
@@ -84,10 +84,6 @@ pub(super) fn fits(model: &JointModel, component: Component) -> bool {
         Component::Transmission => model.parameters.tendon.is_some(),
         Component::Joint | Component::Sensors => true,
     }
-}
-
-pub(super) fn overlaps(a: Target, b: Target) -> bool {
-    Channel::ALL.into_iter().any(|channel| a.includes(channel) && b.includes(channel))
 }
 
 pub(super) fn targets(model: &JointModel, effect: &dyn Effect) -> Vec<Target> {

@@ -6,7 +6,7 @@ use bowden_model::effect::{ActiveEffect, Effect, Target};
 use bowden_model::law::{self, Form, LAWS, Law, Port, Variable};
 use bowden_model::parameters::MotorParameters;
 
-use super::candidates::{Candidate, fits, overlaps, targets};
+use super::candidates::{Candidate, fits, targets};
 use super::unexplained::samples::{Samples, Variable as Seen};
 use super::unexplained::structure::{frequencies_hz, rates_along};
 use crate::fit::objective::{Objective, Series};
@@ -75,7 +75,7 @@ pub(super) fn law_candidates(
         for target in targets(model, law).into_iter().filter(seen) {
             let contained = model.effects.iter().any(|active| {
                 law::of(active).is_some_and(|other| other.port() == law.port() && other.form() == law.form())
-                    && (target == Target::None || overlaps(active.target, target))
+                    && active.target.overlaps(target)
             });
             if contained {
                 continue;

@@ -93,7 +93,7 @@ impl Layout {
     }
 
     /// Index of the first effect that the search has found.
-    fn first_found(&self) -> usize {
+    pub(super) fn first_found(&self) -> usize {
         self.own + self.ordinary.len()
     }
 

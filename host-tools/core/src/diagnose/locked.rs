@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::search::Starts;
+use nalgebra::{DMatrix, DVector};
 
 use crate::fit::objective::{Objective, Series};
 use crate::joint_model::JointModel;
@@ -37,47 +38,94 @@ fn travel_rad(angles_rad: impl Iterator<Item = f64>) -> Option<f64> {
     (low <= high).then_some(high - low)
 }
 
-/// Amplitude, period and phase of a torque locked to an angle, by least squares over whole numbers of periods a turn.
-///
-/// `samples` gives, for one recording, angle and torque sample by sample.
-fn strongest_pattern(
-    base: ActiveEffect,
+/// Angle and torque of one recording, sample by sample.
+type Samples = Vec<(f64, f64)>;
+
+/// A torque locked to an angle, and what those that were there before are beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Pattern {
+    /// The one that is new.
+    pub new: ActiveEffect,
+    /// The others, in their order.
+    pub beside: Vec<ActiveEffect>,
+}
+
+/// Amplitude, period and phase of a torque locked to an angle, by least squares over whole numbers of periods a turn other than
+/// those that are `there`, whose amplitudes and phases are found anew beside it.
+fn strongest_pattern(base: ActiveEffect, there: &[ActiveEffect], samples: &Samples) -> Option<Pattern> {
+    let fewest = FEWEST_PERIODS * TAU / travel_rad(samples.iter().map(|(angle_rad, _)| *angle_rad))?;
+    let cycles = |effect: &ActiveEffect| effect.parameters[1];
+    let mut all: Vec<f64> = there.iter().map(cycles).collect();
+    let left = left_by(samples, &all, &waves(samples, &all)?);
+    let mut best: Option<(f64, f64)> = None;
+    for n in PERIODS_A_TURN.map(f64::from).filter(|n| *n >= fewest) {
+        let start = base.with("cycles_per_turn", n);
+        if there.iter().any(|other| start.excludes(other)) {
+            continue;
+        }
+        let Some([(a, b)]) = waves(&left, &[n]).as_deref().and_then(|found| <[_; 1]>::try_from(found).ok())
+        else {
+            continue;
+        };
+        let gain: f64 =
+            left.iter().map(|(angle, torque)| (a * (n * angle).sin() + b * (n * angle).cos()) * torque).sum();
+        if best.is_none_or(|(most, _)| gain > most) {
+            best = Some((gain, n));
+        }
+    }
+    let (_, n) = best?;
+    all.push(n);
+    let mut found = waves(samples, &all)?;
+    let (a, b) = found.pop()?;
+    let new = base.with("cycles_per_turn", n).with("amplitude_nm", a.hypot(b)).with("phase_rad", b.atan2(a));
+    let beside = there.iter().zip(found).map(|(effect, (da, db))| {
+        let [amplitude_nm, _, phase_rad, ..] = effect.parameters;
+        let (a, b) = (amplitude_nm * phase_rad.cos() + da, amplitude_nm * phase_rad.sin() + db);
+        effect.with("amplitude_nm", a.hypot(b)).with("phase_rad", b.atan2(a))
+    });
+    Some(Pattern { new, beside: beside.collect() })
+}
+
+/// Factors of sine and cosine for each number of periods a turn, by least squares; `None` where the samples do not tell them apart.
+fn waves(samples: &Samples, cycles: &[f64]) -> Option<Vec<(f64, f64)>> {
+    let count = 2 * cycles.len();
+    let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+    let mut row = DVector::zeros(count);
+    for (angle_rad, torque_nm) in samples {
+        for (place, n) in cycles.iter().enumerate() {
+            (row[2 * place], row[2 * place + 1]) = (n * angle_rad).sin_cos();
+        }
+        normal.syger(1.0, &row, &row, 1.0);
+        right.axpy(*torque_nm, &row, 1.0);
+    }
+    normal.fill_upper_triangle_with_lower_triangle();
+    let largest = normal.diagonal().amax();
+    let found =
+        normal.cholesky().filter(|cholesky| cholesky.l_dirty().diagonal().amin().powi(2) > 1e-9 * largest);
+    let solved = if cycles.is_empty() { right } else { found?.solve(&right) };
+    Some(solved.as_slice().chunks(2).map(|pair| (pair[0], pair[1])).collect())
+}
+
+/// `samples` without these waves.
+fn left_by(samples: &Samples, cycles: &[f64], waves: &[(f64, f64)]) -> Samples {
+    let wave = |angle_rad: f64| -> f64 {
+        let each = cycles.iter().zip(waves);
+        each.map(|(n, (a, b))| a * (n * angle_rad).sin() + b * (n * angle_rad).cos()).sum()
+    };
+    samples.iter().map(|(angle_rad, torque_nm)| (*angle_rad, torque_nm - wave(*angle_rad))).collect()
+}
+
+/// The samples of all recordings, where each has them.
+fn of_all(
     predictions: &[Prediction],
-    samples: impl Fn(usize, &Prediction) -> Option<Vec<(f64, f64)>>,
-) -> Option<ActiveEffect> {
-    let samples: Option<Vec<_>> = predictions
+    samples: impl Fn(usize, &Prediction) -> Option<Samples>,
+) -> Option<Samples> {
+    let all: Option<Vec<_>> = predictions
         .iter()
         .enumerate()
         .map(|(recording, prediction)| samples(recording, prediction))
         .collect();
-    let samples: Vec<(f64, f64)> = samples?.into_iter().flatten().collect();
-    let fewest = FEWEST_PERIODS * TAU / travel_rad(samples.iter().map(|(angle_rad, _)| *angle_rad))?;
-    let mut best: Option<(f64, ActiveEffect)> = None;
-    for n in PERIODS_A_TURN.map(f64::from).filter(|n| *n >= fewest) {
-        let (mut ss, mut cc, mut sc, mut st, mut ct) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (angle_rad, torque_nm) in &samples {
-            let (sin, cos) = (n * angle_rad).sin_cos();
-            ss += sin * sin;
-            cc += cos * cos;
-            sc += sin * cos;
-            st += sin * torque_nm;
-            ct += cos * torque_nm;
-        }
-        let determinant = ss * cc - sc * sc;
-        if determinant <= 1e-9 * ss * cc {
-            continue;
-        }
-        let (a, b) = ((st * cc - ct * sc) / determinant, (ct * ss - st * sc) / determinant);
-        let gain = a * st + b * ct;
-        if best.as_ref().is_none_or(|(most, _)| gain > *most) {
-            let start = base
-                .with("amplitude_nm", a.hypot(b))
-                .with("cycles_per_turn", n)
-                .with("phase_rad", b.atan2(a));
-            best = Some((gain, start));
-        }
-    }
-    best.map(|(_, start)| start)
+    Some(all?.into_iter().flatten().collect())
 }
 
 /// The pattern along an angle of the input or of the joint that is left there.
@@ -88,20 +136,29 @@ pub(super) fn locked_start(
     objective: &Objective,
     predictions: &[Prediction],
 ) -> Option<ActiveEffect> {
-    match angle {
-        Channel::ThetaOut => ripple_start(base, model, objective, predictions),
-        _ => cogging_start(base, objective, predictions),
-    }
+    further_pattern(base, &[], angle, model, objective, predictions).map(|pattern| pattern.new)
+}
+
+/// The pattern along such an angle that is left beside those that are `there` in `model`.
+pub(super) fn further_pattern(
+    base: ActiveEffect,
+    there: &[ActiveEffect],
+    angle: Channel,
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> Option<Pattern> {
+    let samples = match angle {
+        Channel::ThetaOut => at_the_joint(model, objective, predictions),
+        _ => at_the_input(objective, predictions),
+    };
+    strongest_pattern(base, there, &samples?)
 }
 
 /// What the motor's model lacks is the torque that guided it, or that a spindle without motor took beyond what was
 /// predicted.
-fn cogging_start(
-    base: ActiveEffect,
-    objective: &Objective,
-    predictions: &[Prediction],
-) -> Option<ActiveEffect> {
-    strongest_pattern(base, predictions, |recording, prediction| {
+fn at_the_input(objective: &Objective, predictions: &[Prediction]) -> Option<Samples> {
+    of_all(predictions, |recording, prediction| {
         let motion = objective.input(recording).motion()?;
         let lacking = lacking_nm(objective, recording, prediction)?;
         let lacking = lacking.into_iter().enumerate().step_by(STRIDE);
@@ -124,14 +181,9 @@ fn lacking_nm(objective: &Objective, recording: usize, prediction: &Prediction) 
 }
 
 /// What the joint's model lacks is what the cables carried less than predicted.
-fn ripple_start(
-    base: ActiveEffect,
-    model: &JointModel,
-    objective: &Objective,
-    predictions: &[Prediction],
-) -> Option<ActiveEffect> {
+fn at_the_joint(model: &JointModel, objective: &Objective, predictions: &[Prediction]) -> Option<Samples> {
     let radius_m = model.parameters.pulleys?.output_radius_m;
-    strongest_pattern(base, predictions, |recording, prediction| {
+    of_all(predictions, |recording, prediction| {
         let of = |channel| {
             let measured = objective.measured(recording, Series::Channel(channel))?;
             Some((measured, prediction.channel(channel)?))
@@ -151,7 +203,6 @@ mod tests {
     use super::{strongest_pattern, too_little_travel};
     use crate::fit::objective::Objective;
     use crate::joint_model::JointModel;
-    use crate::simulation::Prediction;
     use crate::test_bench;
 
     fn effect(id: &str) -> ActiveEffect {
@@ -160,17 +211,41 @@ mod tests {
 
     #[test]
     fn a_wave_starts_at_its_own_period_and_a_slope_at_none_that_the_travel_does_not_show() {
-        let started = |travel_rad: f64, torque_nm: fn(f64) -> f64| {
+        let started = |travel_rad: f64, torque_nm: fn(f64) -> f64, there: &[ActiveEffect]| {
             let angles_rad = (0..=400).map(|k| travel_rad * f64::from(k) / 400.0);
             let samples: Vec<(f64, f64)> = angles_rad.map(|angle| (angle, torque_nm(angle))).collect();
-            let one = [Prediction::default()];
-            strongest_pattern(effect("motor_cogging"), &one, |_, _| Some(samples.clone())).unwrap().parameters
+            strongest_pattern(effect("motor_cogging"), there, &samples).unwrap()
         };
-        let wave = started(20.0, |angle| 0.3 * (7.0 * angle + 0.4).sin());
-        for (value, expected) in wave.iter().zip([0.3, 7.0, 0.4]) {
-            assert!((value - expected).abs() < 1e-9, "{wave:?}");
+        let waves = |angle: f64| 0.3 * (7.0 * angle + 0.4).sin() + 0.1 * (12.0 * angle).sin();
+        let travel_rad = std::f64::consts::TAU * 3.0;
+        let wave = started(travel_rad, waves, &[]);
+        for (value, expected) in wave.new.parameters.iter().zip([0.3, 7.0, 0.4]) {
+            assert!((value - expected).abs() < 1e-3, "{wave:?}");
         }
-        assert_eq!(started(0.8, |angle| angle)[1], 12.0, "one and a half periods of 11.8 a turn are 0.8 rad");
+        assert_eq!(
+            started(0.8, |angle| angle, &[]).new.parameters[1],
+            12.0,
+            "one and a half periods of 11.8 a turn are 0.8 rad"
+        );
+    }
+
+    /// Over a part of a turn the two are not orthogonal, and the first alone comes out wrong.
+    #[test]
+    fn a_further_wave_is_found_beside_those_that_are_there() {
+        let waves = |angle: f64| 0.3 * (7.0 * angle + 0.4).sin() + 0.1 * (12.0 * angle).sin();
+        let first = effect("motor_cogging")
+            .with("cycles_per_turn", 7.0)
+            .with("amplitude_nm", 0.32)
+            .with("phase_rad", 0.5);
+        let left = (0..=400).map(|k| 8.0 * f64::from(k) / 400.0);
+        let left: Vec<(f64, f64)> =
+            left.map(|angle| (angle, waves(angle) - 0.32 * (7.0 * angle + 0.5).sin())).collect();
+        let found = strongest_pattern(effect("motor_cogging"), &[first], &left).unwrap();
+        for (found, expected) in [(found.new, [0.1, 12.0, 0.0]), (found.beside[0], [0.3, 7.0, 0.4])] {
+            for (value, expected) in found.parameters.iter().zip(expected) {
+                assert!((value - expected).abs() < 1e-9, "{found:?}");
+            }
+        }
     }
 
     /// 0.8 rad are one and a half periods of 11.8 a turn.

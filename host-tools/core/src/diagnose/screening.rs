@@ -32,6 +32,9 @@ const WEAKEST: f64 = 0.15;
 /// Strength, in starting strengths, up to which the linear estimate is followed.
 const STRONGEST: f64 = 3.0;
 
+/// Times that a start is made that much stronger.
+const STRENGTHENED: usize = 4;
+
 /// Share of what an effect changes that parameters change as well, from which on it is tried where they make room for it.
 const IN_PLACE_OF: f64 = 0.5;
 
@@ -124,12 +127,7 @@ pub fn screen(
         .map(|(place, judged)| {
             let best = match &judged.linear {
                 Some(linear) if place < VERIFIED && linear.gain > judged.start.gain => {
-                    // Play and stick bend the way between two strengths; only a simulation tells.
-                    let there = background.judge(linear.start);
-                    there
-                        .map(|there| there.start)
-                        .filter(|there| there.gain > judged.start.gain)
-                        .unwrap_or(judged.start)
+                    background.stronger(judged)
                 }
                 _ => judged.best().clone(),
             };
@@ -192,6 +190,26 @@ impl Background<'_> {
             }
         }
         Some(Judged { start: at_start, linear })
+    }
+
+    /// The start at the strength that its estimate says, where that predicts better, and so on while it asks for more than is trusted:
+    /// a rig that lacks a part tells nothing of how strong its effects are. Play and stick bend the way between two strengths; only a
+    /// simulation tells.
+    fn stronger(&self, judged: Judged) -> Screened {
+        let Judged { start: mut best, mut linear } = judged;
+        for _ in 0..STRENGTHENED {
+            let Some(there) = linear.and_then(|linear| self.judge(linear.start)) else { break };
+            if there.start.gain <= best.gain {
+                break;
+            }
+            let asked = there.start.start.parameters[0] / best.start.parameters[0];
+            best = there.start;
+            if asked < 0.99 * STRONGEST {
+                break;
+            }
+            linear = there.linear;
+        }
+        best
     }
 
     /// The same start with parameters where the slopes of the present model put them beside it, or half-way there, where that

@@ -1,7 +1,9 @@
 //! Which effects the data ask for: forward, the best candidate at a time, judged on what the fit has not seen; then
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 
+mod exchange;
 mod laws;
+mod repeating;
 mod trying;
 
 use std::cmp::Ordering;
@@ -91,6 +93,16 @@ pub struct Chosen {
     pub loss_after: f64,
     /// Other candidates of the same round, best first.
     pub others: Vec<Tried>,
+}
+
+impl Chosen {
+    /// Its worth beside all that was found; rivals keep their odds.
+    fn stands(&mut self, loss_before: f64, loss_after: f64) {
+        for tried in &mut self.others {
+            tried.heldout_loss *= loss_after / self.loss_after;
+        }
+        (self.loss_before, self.loss_after) = (loss_before, loss_after);
+    }
 }
 
 /// Result of the selection.
@@ -282,14 +294,16 @@ impl Search<'_> {
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
     ) -> Result<(), Failure> {
-        while chosen.len() < MOST_EFFECTS && !self.progress.interrupted() {
+        while names(chosen) < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(present)?;
             let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
             let Some((found, with)) = self.found(&before, present, fits, worthwhile)? else { break };
             chosen.push(found);
             *present = with;
+            self.add_instances(present, chosen)?;
         }
+        self.exchange(present, chosen)?;
         if self.progress.interrupted() { Ok(()) } else { self.prune(present, chosen) }
     }
 
@@ -361,22 +375,29 @@ impl Search<'_> {
 
     /// Removes effects that the later ones have made superfluous.
     fn prune(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
-        if chosen.len() < 2 {
+        if names(chosen) < 2 {
             return Ok(());
         }
-        self.progress.stage("testing each effect again", chosen.len() as u64);
+        self.progress.stage("testing each effect again", names(chosen) as u64);
         let mut index = 0;
-        while index < chosen.len() && chosen.len() > 1 && !self.progress.interrupted() {
-            let (layout, without) = present.layout.without(&present.solution.model, index);
+        while index < chosen.len() && names(chosen) > 1 && !self.progress.interrupted() {
+            if is_further(chosen, index) {
+                index += 1;
+                continue;
+            }
+            let instances = instances(chosen, index);
+            let (mut layout, mut without) = (present.layout.clone(), present.solution.model.clone());
+            for instance in instances.iter().rev() {
+                (layout, without) = layout.without(&without, *instance);
+            }
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             let bare_loss = self.without_exhausted(&rest)?.loss;
             self.progress.advance(1);
             if worthwhile(bare_loss, present.loss) {
-                chosen[index].loss_before = bare_loss;
-                chosen[index].loss_after = present.loss;
+                chosen[index].stands(bare_loss, present.loss);
                 index += 1;
             } else {
-                chosen.remove(index);
+                instances.iter().rev().for_each(|instance| drop(chosen.remove(*instance)));
                 *present = rest;
             }
         }
@@ -394,6 +415,21 @@ impl Search<'_> {
         let loss = self.objective.mean_loss(&solution.residuals, Part::HeldOut);
         Fitted { layout, solution, loss, finished, unseen: false }
     }
+}
+
+/// Names among what was chosen: instances of one effect on one part have one name.
+fn names(chosen: &[Chosen]) -> usize {
+    (0..chosen.len()).filter(|index| !is_further(chosen, *index)).count()
+}
+
+/// Whether what was chosen in a place is an instance of what was chosen before it.
+fn is_further(chosen: &[Chosen], index: usize) -> bool {
+    chosen[..index].iter().any(|before| before.effect.is_beside(&chosen[index].effect))
+}
+
+/// Places of all instances of what was chosen in a place.
+fn instances(chosen: &[Chosen], index: usize) -> Vec<usize> {
+    (0..chosen.len()).filter(|other| chosen[*other].effect.is_beside(&chosen[index].effect)).collect()
 }
 
 /// Factor of the held-out loss with an effect: its parameters count, and a form that is not the usual one must be worth its choice as

@@ -60,8 +60,11 @@ pub struct NamedEffect {
     pub onset_s: Option<f64>,
     /// Channel, for an effect of a sensor.
     pub channel: Option<String>,
-    /// Fitted parameters.
+    /// Fitted parameters; of the strongest instance where the part has several.
     pub parameters: BTreeMap<String, Estimate>,
+    /// Fitted parameters of the other instances, strongest first: the harmonics of cogging beside the strongest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<BTreeMap<String, Estimate>>,
     /// Part of the held-out loss that it removes, 0 to 1.
     pub heldout_improvement: f64,
     /// One plain sentence.

@@ -33,10 +33,7 @@ pub(super) fn rivals(
         .others
         .iter()
         .filter(|tried| tried.effect.descriptor().id != own_id)
-        .map(|tried| {
-            let ratio = tried.heldout_loss / chosen.loss_after;
-            (tried, ratio.powf(-ODDS_PER_LOSS_RATIO))
-        })
+        .map(|tried| (tried, odds_at(tried.heldout_loss / chosen.loss_after)))
         .collect();
     let sum: f64 = 1.0 + odds.iter().map(|(_, odds)| odds).sum::<f64>();
     let present = 1.0 - 0.5 * (-(improvement - EVEN_IMPROVEMENT).max(0.0) / EVEN_IMPROVEMENT).exp();
@@ -55,6 +52,16 @@ pub(super) fn rivals(
     (present / sum, rivals)
 }
 
+/// Odds of a candidate whose held-out loss is so many times that of the named effect.
+fn odds_at(loss_ratio: f64) -> f64 {
+    loss_ratio.powf(-ODDS_PER_LOSS_RATIO)
+}
+
+/// Whether a candidate whose held-out loss is so many times that of the named effect is listed as its rival.
+pub(super) fn is_listed(loss_ratio: f64) -> bool {
+    odds_at(loss_ratio) > LISTED_ODDS
+}
+
 /// What to record so that an effect shows apart from others.
 fn experiment(effect: &ActiveEffect) -> &'static str {
     effect.effect.told_apart_by().unwrap_or(match effect.descriptor().component {
@@ -63,6 +70,21 @@ fn experiment(effect: &ActiveEffect) -> &'static str {
         Component::Joint => "slow triangles with the weight removed",
         Component::Sensors => "the same motion with the channel's sensor exchanged for its neighbour's",
     })
+}
+
+/// One plain sentence on an effect of which a part has several instances.
+pub(super) fn sentence_of_instances(active: &ActiveEffect, named: &NamedEffect) -> String {
+    let strongest = active.descriptor().parameters.iter().fold(*active, |active, spec| {
+        named.parameters.get(spec.name).map_or(active, |estimate| active.with(spec.name, estimate.value))
+    });
+    // What happens at a moment has no instances.
+    let text = sentence(&strongest, named.heldout_improvement, 0.0);
+    let Some(name) = active.effect.instances_differ_in() else { return text };
+    let others = named.further.iter().filter_map(|one| one.get(name)).map(|estimate| short(estimate.value));
+    let others: Vec<String> = others.collect();
+    let meaning =
+        active.descriptor().parameters.iter().find(|spec| spec.name == name).map(|spec| spec.meaning);
+    format!("{text} That is with {} more, {} {}.", others.len(), meaning.unwrap_or(name), others.join(", "))
 }
 
 /// One plain sentence on an effect.

@@ -51,6 +51,7 @@ fn diagnosis() -> Diagnosis {
             ("extra_wrap_angle_rad".into(), estimate(0.8231, Some(0.0214), "rad")),
             ("duration_s".into(), estimate(6.31, Some(0.12), "s")),
         ]),
+        further: vec![],
         heldout_improvement: 0.714,
         sentence:
             "Something bent the sheath between 21.4 s and 27.7 s, which raised friction at the output ends."
@@ -69,6 +70,7 @@ fn diagnosis() -> Diagnosis {
         onset_s: None,
         channel: None,
         parameters: BTreeMap::from([("torque_nm".into(), estimate(0.003_92, Some(0.000_31), "N m"))]),
+        further: vec![],
         heldout_improvement: 0.083,
         sentence: "The motor loses a constant torque against its direction of motion.".into(),
         rivals: vec![],
@@ -80,6 +82,7 @@ fn diagnosis() -> Diagnosis {
         onset_s: None,
         channel: Some("f4_n".into()),
         parameters: BTreeMap::from([("offset".into(), estimate(2.0, None, "N"))]),
+        further: vec![],
         heldout_improvement: 0.031,
         sentence: "The sensor of f4_n reads too high by a constant.".into(),
         rivals: vec![Rival {

@@ -61,11 +61,13 @@ pub fn card(effect: &NamedEffect) -> Markup {
                         th scope="col" { "Value ± standard deviation" }
                         th scope="col" { "Remark" }
                     } }
-                    tbody { @for (name, estimate) in &effect.parameters { tr {
-                        th scope="row" { code { (name) } }
-                        td { (figures::estimate(estimate.value, estimate.std, &estimate.unit)) }
-                        td { (remark(estimate.at_bound, estimate.std)) }
-                    } } }
+                    @for instance in std::iter::once(&effect.parameters).chain(&effect.further) {
+                        tbody { @for (name, estimate) in instance { tr {
+                            th scope="row" { code { (name) } }
+                            td { (figures::estimate(estimate.value, estimate.std, &estimate.unit)) }
+                            td { (remark(estimate.at_bound, estimate.std)) }
+                        } } }
+                    }
                 }
             }
             @if !effect.rivals.is_empty() {

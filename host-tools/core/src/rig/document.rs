@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bowden_model::effect::{ActiveEffect, Target};
+use bowden_model::effect::ActiveEffect;
 use bowden_model::law;
 use bowden_model::parameters::nominal;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
@@ -96,7 +96,7 @@ impl RigDocument {
         }
         let effects = section_mut(&mut self.document, "effects").ok_or_else(|| refuse("effects"))?;
         let item = effects.entry(id).or_insert(Item::None);
-        let place = place_for(item, active.target).ok_or_else(|| refuse(&format!("effects.{id}")))?;
+        let place = place_for(item, active).ok_or_else(|| refuse(&format!("effects.{id}")))?;
         fill(place, active);
         Ok(())
     }
@@ -142,14 +142,17 @@ fn section_mut<'d>(document: &'d mut DocumentMut, key: &str) -> Option<&'d mut d
     item.as_table_like_mut()
 }
 
-/// The table that describes an effect on a sensor: the one there is, or a new one beside it.
-fn place_for(item: &mut Item, target: Target) -> Option<&mut dyn toml_edit::TableLike> {
+/// The table that describes an effect on a sensor, or an instance of it: the one there is, or a new one beside it.
+fn place_for<'d>(item: &'d mut Item, active: &ActiveEffect) -> Option<&'d mut dyn toml_edit::TableLike> {
     if item.is_none() {
         *item = Item::Table(Table::new());
         return item.as_table_like_mut();
     }
     let describes = |table: &dyn toml_edit::TableLike| {
-        table.get(CHANNEL_KEY).is_none_or(|channel| channel.as_str() == target.name())
+        let differs = active.effect.instances_differ_in();
+        let other = differs.and_then(|name| Some(active.with(name, number(table.get(name)?)?)));
+        table.get(CHANNEL_KEY).is_none_or(|channel| channel.as_str() == active.target.name())
+            && other.is_none_or(|other| active.excludes(&other))
     };
     if item.as_table_like().is_some_and(|table| !describes(table)) {
         let table = std::mem::take(item).into_table().ok()?;
@@ -176,6 +179,11 @@ fn fill(table: &mut dyn toml_edit::TableLike, active: &ActiveEffect) {
     for (spec, value) in active.descriptor().parameters.iter().zip(active.parameters) {
         set_number(table.entry(spec.name).or_insert(Item::None), value);
     }
+}
+
+/// A number that may be written as a whole one.
+fn number(item: &Item) -> Option<f64> {
+    item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64))
 }
 
 /// Replaces a number and keeps the comment behind it.

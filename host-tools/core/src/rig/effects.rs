@@ -1,7 +1,7 @@
 //! Effects of a rig file: `simulation.effects` and the tables `[effects.ID]`.
 //!
 //! Where an effect of a sensor acts on several channels in different strength, its tables form a list,
-//! `[[effects.ID]]`, one entry a channel.
+//! `[[effects.ID]]`, one entry a channel. So do the instances of one that a part has several times, as the harmonics of cogging.
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Descriptor, Effect, Target};
@@ -102,19 +102,18 @@ fn read_entry(
         }
     }
     for target in targets(section, descriptor)? {
-        if active.iter().any(|other| other.descriptor().id == descriptor.id && overlap(other.target, target))
-        {
+        let one = ActiveEffect { effect, parameters, target };
+        if active.iter().any(|other| one.excludes(other)) {
             let named = target.name().map_or(String::new(), |name| format!(" on {name}"));
-            let reason = format!("effect `{}`{named} is described twice; keep one table", descriptor.id);
+            let advice = effect
+                .instances_differ_in()
+                .map_or(String::from("keep one table"), |name| format!("`{name}` differs by 5 % at least"));
+            let reason = format!("effect `{}`{named} is described twice; {advice}", descriptor.id);
             return Err(section.source.at(&section.span, reason));
         }
-        active.push(ActiveEffect { effect, parameters, target });
+        active.push(one);
     }
     Ok(())
-}
-
-fn overlap(one: Target, other: Target) -> bool {
-    one == other || Channel::ALL.into_iter().any(|channel| one.includes(channel) && other.includes(channel))
 }
 
 /// Sensors on which an effect acts: one target each, all four tensions as one.

@@ -146,12 +146,19 @@ pub(super) fn cogging(active: &ActiveEffect, draft: &mut Draft, source: &str) ->
             .to_owned());
     }
     let [amplitude_nm, cycles_per_turn, phase_rad, ..] = active.parameters;
-    let values = [
-        ("correction.cogging.amplitude_1", amplitude_nm),
-        ("correction.cogging.periods_1", cycles_per_turn),
-        ("correction.cogging.phase_1", phase_rad),
-    ];
-    set(draft, source, &COGGING, &values)
+    COGGING.begin(draft, source)?;
+    for place in [1, 2] {
+        let name = |what: &str| format!("correction.cogging.{what}_{place}");
+        if draft.value(&name("amplitude"))? == 0.0 {
+            draft.set(&name("amplitude"), amplitude_nm, &source)?;
+            draft.set(&name("periods"), cycles_per_turn, &source)?;
+            return draft.set(&name("phase"), phase_rad, &source);
+        }
+    }
+    Err(format!(
+        "the board takes the two strongest harmonics, {cycles_per_turn:.1} periods a turn are not among them; write a ripple table \
+         that has them all"
+    ))
 }
 
 pub(super) fn dead_zone(active: &ActiveEffect, draft: &mut Draft, source: &str) -> Result<(), String> {

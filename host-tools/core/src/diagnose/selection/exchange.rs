@@ -1,0 +1,95 @@
+//! Names against their rivals once more, beside all that was found after them.
+//!
+//! A name is chosen while others are still missing, and what it is chosen for may be a part of what they do: its rivals of that round are
+//! fitted in its place beside the others, one takes the place where it predicts better, and the odds of all are those of the end.
+
+use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further};
+use crate::diagnose::words::is_listed;
+use crate::fit::solver::{COARSE_STEP, FINE_STEP};
+use crate::outcome::Failure;
+
+/// Most rivals of a name that are fitted in its place.
+const RIVALS: usize = 3;
+
+impl Search<'_> {
+    /// Fits the rivals of every name but the last in its place, and keeps what predicts best.
+    pub(super) fn exchange(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
+        let last = (0..chosen.len()).rfind(|index| !is_further(chosen, *index)).unwrap_or(0);
+        // What takes a place stands last, so that places before it stay.
+        for index in (0..last).rev() {
+            if !is_further(chosen, index) && !self.progress.interrupted() {
+                self.exchange_one(index, present, chosen)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn exchange_one(
+        &self,
+        index: usize,
+        present: &mut Fitted,
+        chosen: &mut Vec<Chosen>,
+    ) -> Result<(), Failure> {
+        let mut rivals = self.rivals_beside_the_rest(index, present, chosen)?;
+        if rivals.is_empty() || self.progress.interrupted() {
+            return Ok(());
+        }
+        let own = &mut chosen[index];
+        let not_fitted = own.others.split_off(rivals.len());
+        own.others = rivals.iter().map(|fitted| fitted.tried(fitted.loss)).collect();
+        // The others keep their odds.
+        let now = present.loss / own.loss_after;
+        own.others.extend(
+            not_fitted.into_iter().map(|tried| Tried { heldout_loss: now * tried.heldout_loss, ..tried }),
+        );
+        own.loss_after = present.loss;
+        own.model = present.without_ordinary();
+        rivals.sort_by(Fitted::best_first);
+        let best = rivals.swap_remove(0);
+        if best.handicapped() >= handicap(&own.effect) * present.loss {
+            return Ok(());
+        }
+        let before = chosen[index].clone();
+        let instances = instances(chosen, index);
+        instances.iter().rev().for_each(|instance| drop(chosen.remove(*instance)));
+        let tried = best.tried(best.loss);
+        let is_other = |other: &Tried| !other.effect.is_beside(&tried.effect);
+        let mut others: Vec<Tried> = before.others.into_iter().filter(is_other).collect();
+        others.push(Tried { effect: before.effect, model: before.model, heldout_loss: before.loss_after });
+        let Tried { effect, model, heldout_loss: loss_after } = tried;
+        chosen.push(Chosen { effect, model, loss_before: before.loss_before, loss_after, others });
+        *present = best;
+        Ok(())
+    }
+
+    /// The listed rivals of a name, which stand first among its others, each fitted in its place beside all that was found.
+    fn rivals_beside_the_rest(
+        &self,
+        index: usize,
+        present: &Fitted,
+        chosen: &mut [Chosen],
+    ) -> Result<Vec<Fitted>, Failure> {
+        let found: Vec<&str> = chosen.iter().map(|one| one.effect.descriptor().id).collect();
+        let loss_then = chosen[index].loss_after;
+        let is_rival = |tried: &Tried| {
+            !found.contains(&tried.effect.descriptor().id) && is_listed(tried.heldout_loss / loss_then)
+        };
+        let (mut rivals, rest): (Vec<Tried>, Vec<Tried>) =
+            std::mem::take(&mut chosen[index].others).into_iter().partition(is_rival);
+        let most = rivals.len().min(RIVALS);
+        let (mut layout, mut without) = (present.layout.clone(), present.solution.model.clone());
+        for instance in instances(chosen, index).iter().rev() {
+            (layout, without) = layout.without(&without, *instance);
+        }
+        self.progress.stage("fitting rivals in place of an effect", most as u64);
+        let mut fits = Vec::new();
+        for tried in &rivals[..most] {
+            let (layout, with) = layout.with(&without, tried.effect);
+            fits.push(self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?);
+            self.progress.advance(1);
+        }
+        rivals.extend(rest);
+        chosen[index].others = rivals;
+        Ok(fits)
+    }
+}
