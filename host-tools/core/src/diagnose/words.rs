@@ -84,7 +84,12 @@ pub(super) fn sentence_of_instances(active: &ActiveEffect, named: &NamedEffect) 
     let others: Vec<String> = others.collect();
     let meaning =
         active.descriptor().parameters.iter().find(|spec| spec.name == name).map(|spec| spec.meaning);
-    format!("{text} That is with {} more, {} {}.", others.len(), meaning.unwrap_or(name), others.join(", "))
+    format!(
+        "{text} There are {} more of it, with {} {}.",
+        others.len(),
+        meaning.unwrap_or(name),
+        others.join(", ")
+    )
 }
 
 /// One plain sentence on an effect.

@@ -54,20 +54,20 @@ pub fn card(effect: &NamedEffect) -> Markup {
                 } }
                 div { dt { "Removes" } dd { (figures::share(effect.heldout_improvement)) " of the held-out loss" } }
             }
-            @if !effect.parameters.is_empty() {
+            @if !effect.further.is_empty() {
+                (instances(effect))
+            } @else if !effect.parameters.is_empty() {
                 table.parameters {
                     thead { tr {
                         th scope="col" { "Parameter" }
                         th scope="col" { "Value ± standard deviation" }
                         th scope="col" { "Remark" }
                     } }
-                    @for instance in std::iter::once(&effect.parameters).chain(&effect.further) {
-                        tbody { @for (name, estimate) in instance { tr {
-                            th scope="row" { code { (name) } }
-                            td { (figures::estimate(estimate.value, estimate.std, &estimate.unit)) }
-                            td { (remark(estimate.at_bound, estimate.std)) }
-                        } } }
-                    }
+                    tbody { @for (name, estimate) in &effect.parameters { tr {
+                        th scope="row" { code { (name) } }
+                        td { (figures::estimate(estimate.value, estimate.std, &estimate.unit)) }
+                        td { (remark(estimate.at_bound, estimate.std)) }
+                    } } }
                 }
             }
             @if !effect.rivals.is_empty() {
@@ -77,6 +77,21 @@ pub fn card(effect: &NamedEffect) -> Markup {
                     ". To tell them apart: " (rival.separating_experiment)
                 } } }
             }
+        }
+    }
+}
+
+/// Parameters of an effect that the part has several times, strongest first.
+fn instances(effect: &NamedEffect) -> Markup {
+    html! {
+        table {
+            thead { tr { @for name in effect.parameters.keys() { th.number scope="col" { code { (name) } } } } }
+            tbody { @for instance in std::iter::once(&effect.parameters).chain(&effect.further) { tr {
+                @for estimate in instance.values() { td.number {
+                    (figures::estimate(estimate.value, estimate.std, &estimate.unit))
+                    @if estimate.at_bound { " " (remark(true, None)) }
+                } }
+            } } }
         }
     }
 }

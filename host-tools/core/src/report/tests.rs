@@ -71,6 +71,23 @@ fn every_finding_is_shown() {
     }
 }
 
+/// An effect that a part has several times stands in one table, a row each.
+#[test]
+fn instances_of_an_effect_stand_side_by_side() {
+    let mut findings = example::findings(2000);
+    let before = render(&findings).matches("<tr").count();
+    let effect = &mut findings.diagnosis.effects[0];
+    let parameters = effect.parameters.clone();
+    effect.further = vec![parameters; 3];
+    let page = render(&findings);
+    // A heading and four rows in place of a heading and a row for each parameter.
+    let rows = findings.diagnosis.effects[0].parameters.len();
+    assert_eq!(page.matches("<tr").count(), before - rows + 4);
+    for name in findings.diagnosis.effects[0].parameters.keys() {
+        assert_eq!(page.matches(&format!("<code>{name}</code>")).count(), 1, "{name}");
+    }
+}
+
 #[test]
 fn text_from_files_is_escaped() {
     let hostile = "<script>alert(\"x\")</script>&'";
