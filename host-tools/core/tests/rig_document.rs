@@ -194,7 +194,9 @@ fn an_instance_of_an_effect_is_replaced_and_another_stands_beside_it() {
     let refused = Rig::parse(&text, "rig.toml").unwrap_err();
     assert_eq!(refused.class(), FailureClass::BadInput);
     assert!(
-        refused.message().ends_with("described twice; `cycles_per_turn` differs by 5 % at least"),
+        refused
+            .message()
+            .ends_with("described twice; let `cycles_per_turn` differ by 5 % at least, or keep one table"),
         "{refused:?}"
     );
 }

@@ -105,9 +105,9 @@ fn read_entry(
         let one = ActiveEffect { effect, parameters, target };
         if active.iter().any(|other| one.excludes(other)) {
             let named = target.name().map_or(String::new(), |name| format!(" on {name}"));
-            let advice = effect
-                .instances_differ_in()
-                .map_or(String::from("keep one table"), |name| format!("`{name}` differs by 5 % at least"));
+            let advice = effect.instances_differ_in().map_or(String::from("keep one table"), |name| {
+                format!("let `{name}` differ by 5 % at least, or keep one table")
+            });
             let reason = format!("effect `{}`{named} is described twice; {advice}", descriptor.id);
             return Err(section.source.at(&section.span, reason));
         }
