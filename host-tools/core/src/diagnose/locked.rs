@@ -56,26 +56,21 @@ fn strongest_pattern(base: ActiveEffect, there: &[ActiveEffect], samples: &Sampl
     let fewest = FEWEST_PERIODS * TAU / travel_rad(samples.iter().map(|(angle_rad, _)| *angle_rad))?;
     let cycles = |effect: &ActiveEffect| effect.parameters[1];
     let mut all: Vec<f64> = there.iter().map(cycles).collect();
-    let left = left_by(samples, &all, &waves(samples, &all)?);
+    let left = left_by(samples, &all, &Waves::of(samples, &all)?.factors);
     let mut best: Option<(f64, f64)> = None;
     for n in PERIODS_A_TURN.map(f64::from).filter(|n| *n >= fewest) {
         let start = base.with("cycles_per_turn", n);
         if there.iter().any(|other| start.excludes(other)) {
             continue;
         }
-        let Some([(a, b)]) = waves(&left, &[n]).as_deref().and_then(|found| <[_; 1]>::try_from(found).ok())
-        else {
-            continue;
-        };
-        let gain: f64 =
-            left.iter().map(|(angle, torque)| (a * (n * angle).sin() + b * (n * angle).cos()) * torque).sum();
+        let Some(Waves { gain, .. }) = Waves::of(&left, &[n]) else { continue };
         if best.is_none_or(|(most, _)| gain > most) {
             best = Some((gain, n));
         }
     }
     let (_, n) = best?;
     all.push(n);
-    let mut found = waves(samples, &all)?;
+    let mut found = Waves::of(samples, &all)?.factors;
     let (a, b) = found.pop()?;
     let new = base.with("cycles_per_turn", n).with("amplitude_nm", a.hypot(b)).with("phase_rad", b.atan2(a));
     let beside = there.iter().zip(found).map(|(effect, (da, db))| {
@@ -86,24 +81,40 @@ fn strongest_pattern(base: ActiveEffect, there: &[ActiveEffect], samples: &Sampl
     Some(Pattern { new, beside: beside.collect() })
 }
 
-/// Factors of sine and cosine for each number of periods a turn, by least squares; `None` where the samples do not tell them apart.
-fn waves(samples: &Samples, cycles: &[f64]) -> Option<Vec<(f64, f64)>> {
-    let count = 2 * cycles.len();
-    let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
-    let mut row = DVector::zeros(count);
-    for (angle_rad, torque_nm) in samples {
-        for (place, n) in cycles.iter().enumerate() {
-            (row[2 * place], row[2 * place + 1]) = (n * angle_rad).sin_cos();
+/// Waves along an angle by least squares.
+struct Waves {
+    /// Factors of sine and cosine for each number of periods a turn.
+    factors: Vec<(f64, f64)>,
+    /// What they take off the sum of the squared torques.
+    gain: f64,
+}
+
+impl Waves {
+    /// `None` where the samples do not tell the waves apart.
+    fn of(samples: &Samples, cycles: &[f64]) -> Option<Self> {
+        if cycles.is_empty() {
+            return Some(Self { factors: Vec::new(), gain: 0.0 });
         }
-        normal.syger(1.0, &row, &row, 1.0);
-        right.axpy(*torque_nm, &row, 1.0);
+        let count = 2 * cycles.len();
+        let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut row = DVector::zeros(count);
+        for (angle_rad, torque_nm) in samples {
+            for (place, n) in cycles.iter().enumerate() {
+                (row[2 * place], row[2 * place + 1]) = (n * angle_rad).sin_cos();
+            }
+            normal.syger(1.0, &row, &row, 1.0);
+            right.axpy(*torque_nm, &row, 1.0);
+        }
+        let largest = normal.diagonal().amax();
+        // Only the lower triangle is read.
+        let normal = normal.cholesky()?;
+        if normal.l_dirty().diagonal().amin().powi(2) <= 1e-9 * largest {
+            return None;
+        }
+        let solved = normal.solve(&right);
+        let factors = solved.as_slice().chunks_exact(2).map(|pair| (pair[0], pair[1])).collect();
+        Some(Self { factors, gain: solved.dot(&right) })
     }
-    normal.fill_upper_triangle_with_lower_triangle();
-    let largest = normal.diagonal().amax();
-    let found =
-        normal.cholesky().filter(|cholesky| cholesky.l_dirty().diagonal().amin().powi(2) > 1e-9 * largest);
-    let solved = if cycles.is_empty() { right } else { found?.solve(&right) };
-    Some(solved.as_slice().chunks(2).map(|pair| (pair[0], pair[1])).collect())
 }
 
 /// `samples` without these waves.

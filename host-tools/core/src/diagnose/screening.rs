@@ -33,7 +33,7 @@ const WEAKEST: f64 = 0.15;
 const STRONGEST: f64 = 3.0;
 
 /// Times that a start is made that much stronger.
-const STRENGTHENED: usize = 4;
+const STRENGTHENED: usize = 8;
 
 /// Share of what an effect changes that parameters change as well, from which on it is tried where they make room for it.
 const IN_PLACE_OF: f64 = 0.5;

@@ -253,6 +253,12 @@ impl Fitted {
         self.layout.without_ordinary(&self.solution.model)
     }
 
+    /// The model without the found effects in these places, which rise.
+    fn without(&self, places: &[usize]) -> (Layout, JointModel) {
+        let all = (self.layout.clone(), self.solution.model.clone());
+        places.iter().rev().fold(all, |(layout, model), place| layout.without(&model, *place))
+    }
+
     /// Held-out loss with the advantage that simpler effects get.
     fn handicapped(&self) -> f64 {
         self.loss * handicap(&self.newest())
@@ -386,10 +392,7 @@ impl Search<'_> {
                 continue;
             }
             let instances = instances(chosen, index);
-            let (mut layout, mut without) = (present.layout.clone(), present.solution.model.clone());
-            for instance in instances.iter().rev() {
-                (layout, without) = layout.without(&without, *instance);
-            }
+            let (layout, without) = present.without(&instances);
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             let bare_loss = self.without_exhausted(&rest)?.loss;
             self.progress.advance(1);
@@ -397,7 +400,7 @@ impl Search<'_> {
                 chosen[index].stands(bare_loss, present.loss);
                 index += 1;
             } else {
-                instances.iter().rev().for_each(|instance| drop(chosen.remove(*instance)));
+                remove(chosen, &instances);
                 *present = rest;
             }
         }
@@ -430,6 +433,13 @@ fn is_further(chosen: &[Chosen], index: usize) -> bool {
 /// Places of all instances of what was chosen in a place.
 fn instances(chosen: &[Chosen], index: usize) -> Vec<usize> {
     (0..chosen.len()).filter(|other| chosen[*other].effect.is_beside(&chosen[index].effect)).collect()
+}
+
+/// Takes out what was chosen in these places, which rise.
+fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
+    for place in places.iter().rev() {
+        chosen.remove(*place);
+    }
 }
 
 /// Factor of the held-out loss with an effect: its parameters count, and a form that is not the usual one must be worth its choice as

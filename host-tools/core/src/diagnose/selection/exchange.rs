@@ -3,7 +3,7 @@
 //! A name is chosen while others are still missing, and what it is chosen for may be a part of what they do: its rivals of that round are
 //! fitted in its place beside the others, one takes the place where it predicts better, and the odds of all are those of the end.
 
-use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further};
+use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further, remove};
 use crate::diagnose::words::is_listed;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -51,7 +51,7 @@ impl Search<'_> {
         }
         let before = chosen[index].clone();
         let instances = instances(chosen, index);
-        instances.iter().rev().for_each(|instance| drop(chosen.remove(*instance)));
+        remove(chosen, &instances);
         let tried = best.tried(best.loss);
         let is_other = |other: &Tried| !other.effect.is_beside(&tried.effect);
         let mut others: Vec<Tried> = before.others.into_iter().filter(is_other).collect();
@@ -77,10 +77,7 @@ impl Search<'_> {
         let (mut rivals, rest): (Vec<Tried>, Vec<Tried>) =
             std::mem::take(&mut chosen[index].others).into_iter().partition(is_rival);
         let most = rivals.len().min(RIVALS);
-        let (mut layout, mut without) = (present.layout.clone(), present.solution.model.clone());
-        for instance in instances(chosen, index).iter().rev() {
-            (layout, without) = layout.without(&without, *instance);
-        }
+        let (layout, without) = present.without(&instances(chosen, index));
         self.progress.stage("fitting rivals in place of an effect", most as u64);
         let mut fits = Vec::new();
         for tried in &rivals[..most] {

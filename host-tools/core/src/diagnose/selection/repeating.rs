@@ -8,11 +8,14 @@ use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::search::Starts;
 
 use super::{Chosen, Fitted, LOSS_PER_PARAMETER, Search, WORTHWHILE_LOSS, is_further};
+use crate::diagnose::layout::Layout;
 use crate::diagnose::locked::{Pattern, further_pattern, too_little_travel};
-use crate::fit::objective::{Part, Residuals};
+use crate::fit::objective::Part;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::fit::typical::sized;
+use crate::joint_model::JointModel;
 use crate::outcome::Failure;
+use crate::simulation::Prediction;
 
 /// Most instances of one effect.
 const MOST_INSTANCES: usize = 8;
@@ -40,11 +43,10 @@ impl Search<'_> {
             if is_further(chosen, index) || effect.effect.instances_differ_in().is_none() {
                 continue;
             }
-            let Some((started, added)) = self.further_instances(present, &effect)? else { continue };
+            let Some((layout, model, added)) = self.further_instances(present, &effect)? else { continue };
             self.progress.stage("fitting further instances", 0);
-            let with = self.fit(started.layout, &started.solution.model, &[COARSE_STEP, FINE_STEP])?;
-            let (with, added) = self.without_idle(with, added)?;
-            if added == 0 || self.progress.interrupted() || !worth_having(present.loss, with.loss) {
+            let with = self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?;
+            if self.progress.interrupted() || !worth_having(present.loss, with.loss) {
                 continue;
             }
             let places = with.solution.model.effects.len() - added..;
@@ -60,90 +62,55 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// `with` without those of its last `added` effects that the fitted data do not miss, and how many of them are left: what an instance
-    /// stood for may have gone into the periods of others once all were fitted.
-    fn without_idle(&self, with: Fitted, added: usize) -> Result<(Fitted, usize), Failure> {
-        let objective = self.objective;
-        let loss = |residuals: &Residuals| objective.mean_loss(residuals, Part::Training);
-        let mut model = with.solution.model.clone();
-        let mut present = loss(&with.solution.residuals);
-        let mut left = added;
-        let mut by_strength: Vec<usize> = (model.effects.len() - added..model.effects.len()).collect();
-        by_strength.sort_by(|a, b| {
-            let strength = |index: &usize| with.solution.model.effects[*index].parameters[0].abs();
-            strength(a).total_cmp(&strength(b))
-        });
-        let mut idle = Vec::new();
-        for index in by_strength {
-            let mut without = model.clone();
-            without.effects[index].parameters[0] = 0.0;
-            let bare = loss(&objective.residuals(&without)?);
-            if bare - present < WORTHWHILE_LOSS {
-                idle.push(index);
-                left -= 1;
-                (model, present) = (without, bare);
-            }
-        }
-        if idle.is_empty() {
-            return Ok((with, added));
-        }
-        idle.sort_unstable();
-        for index in idle.into_iter().rev() {
-            model.effects.remove(index);
-        }
-        Ok((self.fit(with.layout, &model, &[FINE_STEP])?, left))
-    }
-
-    /// `present` with the strongest patterns that are left, one after the other, where each takes something off the fitted loss, and
-    /// how many they are; `None` where none does.
+    /// The model of `present` with the strongest patterns that are left, one after the other, where each takes something off the fitted
+    /// loss, its layout, and how many they are; `None` where none does.
     fn further_instances(
         &self,
         present: &Fitted,
         effect: &ActiveEffect,
-    ) -> Result<Option<(Fitted, usize)>, Failure> {
+    ) -> Result<Option<(Layout, JointModel, usize)>, Failure> {
         let objective = self.objective;
         let Starts::LockedTo(angle) = effect.effect.starts() else { return Ok(None) };
-        let instances = |fitted: &Fitted| {
-            fitted.solution.model.effects.iter().filter(|other| other.is_beside(effect)).count()
-        };
-        let training = |fitted: &Fitted| objective.mean_loss(&fitted.solution.residuals, Part::Training);
-        let mut with = present.clone();
-        while instances(&with) < MOST_INSTANCES
-            && with.solution.model.effects.len() + LEFT_TO_NAMES < MAX_ACTIVE
-            && !self.progress.interrupted()
-        {
-            let model = &with.solution.model;
-            let base = ActiveEffect { target: effect.target, ..sized(model, effect.effect) };
-            let predictions = objective.predict(model)?;
-            let found = with.layout.first_found()..;
+        let loss =
+            |predictions: &[Prediction]| objective.mean_loss(&objective.compare(predictions), Part::Training);
+        let (mut layout, mut model) = (present.layout.clone(), present.solution.model.clone());
+        let mut predictions = objective.predict(&model)?;
+        let mut added = 0;
+        loop {
+            let found = layout.first_found()..;
             let there: Vec<ActiveEffect> = model.effects[found.clone()]
                 .iter()
                 .filter(|other| other.is_beside(effect))
                 .copied()
                 .collect();
-            let Some(Pattern { new: start, beside }) =
-                further_pattern(base, &there, angle, model, objective, &predictions)
-            else {
-                break;
-            };
-            let (layout, mut next) = with.layout.with(model, start);
-            // The new one stands last, behind those beside it.
-            let others = next.effects[found].iter_mut().filter(|other| other.is_beside(effect));
-            others.zip(beside).for_each(|(other, beside)| *other = beside);
-            let mut solution = with.solution.clone();
-            solution.residuals = objective.residuals(&next)?;
-            solution.model = next;
-            let next = self.judged(layout, solution, false);
-            let gain = training(&with) - training(&next);
-            if too_little_travel(objective, &start)
-                || gain < WORTHWHILE_LOSS
-                || gain < PROMISING_INSTANCE * training(&with)
+            if there.len() >= MOST_INSTANCES
+                || model.effects.len() + LEFT_TO_NAMES >= MAX_ACTIVE
+                || self.progress.interrupted()
             {
                 break;
             }
-            with = next;
+            let base = ActiveEffect { target: effect.target, ..sized(&model, effect.effect) };
+            let Some(Pattern { new, beside }) =
+                further_pattern(base, &there, angle, &model, objective, &predictions)
+            else {
+                break;
+            };
+            let (next_layout, mut next) = layout.with(&model, new);
+            // The new one stands last, behind those beside it.
+            let others = next.effects[found].iter_mut().filter(|other| other.is_beside(effect));
+            others.zip(beside).for_each(|(other, beside)| *other = beside);
+            let next_predictions = objective.predict(&next)?;
+            let before = loss(&predictions);
+            let gain = before - loss(&next_predictions);
+            if too_little_travel(objective, &new)
+                || gain < WORTHWHILE_LOSS
+                || gain < PROMISING_INSTANCE * before
+            {
+                break;
+            }
+            (layout, model, predictions) = (next_layout, next, next_predictions);
+            added += 1;
         }
-        let added = instances(&with) - instances(present);
-        Ok((added > 0).then_some((with, added)))
+        Ok((added > 0).then_some((layout, model, added)))
     }
 }
