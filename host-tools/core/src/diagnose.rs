@@ -43,8 +43,8 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 use crate::recording::Recording;
-use crate::rig::{Rig, RigDocument, RigParameter};
-use crate::study::{Role, Study};
+use crate::rig::{Rig, RigDocument, RigParameter, Undecided};
+use crate::study::{Bench, Role, Study};
 use afterwards::afterwards;
 use experiment::{Bearable, Shown};
 pub use experiment::{Experiment, SECONDS as EXPERIMENT_S};
@@ -94,6 +94,8 @@ struct BenchNow {
     stated_effects: usize,
     /// Parameters that the fit may have moved.
     fitted: Vec<RigParameter>,
+    /// What else would fit.
+    undecided: Vec<Undecided>,
 }
 
 impl Diagnosed {
@@ -102,7 +104,10 @@ impl Diagnosed {
     /// # Errors
     /// When the file cannot take a value.
     pub fn write_into(&self, bench: usize, document: &mut RigDocument) -> Result<(), Failure> {
-        let Some(BenchNow { joint, stated_effects, fitted }) = self.now.get(bench) else { return Ok(()) };
+        let Some(BenchNow { joint, stated_effects, fitted, undecided }) = self.now.get(bench) else {
+            return Ok(());
+        };
+        document.set_undecided(undecided);
         for parameter in fitted {
             match (parameter, joint.value(parameter)) {
                 (RigParameter::Nominal(parameter), Some(value)) => {
@@ -151,11 +156,11 @@ pub fn diagnose_within(
     let heldout = study.recordings_as(Role::HeldOut).collect();
     let objective = Objective::of(&model, study.observed(&model)?)?;
     judged(&objective, &training)?;
-    let benches: Result<Vec<(&String, Variation)>, Failure> = study
+    let benches: Result<Vec<(&Bench, Variation)>, Failure> = study
         .benches
         .iter()
         .enumerate()
-        .map(|(index, bench)| Ok((&bench.name, study.variation_of_bench(index, &model)?)))
+        .map(|(index, bench)| Ok((bench, study.variation_of_bench(index, &model)?)))
         .collect();
     let case = Case {
         rig: &study.benches[0].rig,
@@ -269,8 +274,8 @@ struct Case<'a> {
     objective: &'a Objective,
     /// The joint that all recordings share, as the first rig states it.
     model: &'a JointModel,
-    /// Names of the benches, and what turns the shared joint into each.
-    benches: Vec<(&'a String, Variation)>,
+    /// The benches, and what turns the shared joint into each.
+    benches: Vec<(&'a Bench, Variation)>,
     /// Where the motions that separate hypotheses may go.
     allowed: Allowed<'a>,
 }
@@ -292,12 +297,25 @@ fn refine(
 
 impl Case<'_> {
     /// A bench after its recordings, whose diagnosed joint is a variation of `diagnosed`.
-    fn now(&self, bench: &Variation, diagnosed: &JointModel, clock_s: f64) -> BenchNow {
-        let joint = bench.apply(diagnosed);
-        let stated_effects = bench.base().effects.len();
+    fn now(
+        &self,
+        (bench, variation): &(&Bench, Variation),
+        diagnosed: &JointModel,
+        recalibrated: &[Recalibrated],
+        clock_s: f64,
+    ) -> BenchNow {
+        let joint = variation.apply(diagnosed);
+        let stated_effects = variation.base().effects.len();
         let calibrated = Layout::of(self.model).calibrated(self.model);
         let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
-        BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted }
+        let of_bench = |radius: &&Recalibrated| radius.bench.as_ref().is_none_or(|own| *own == bench.name);
+        let undecided = off_centre::undecided(
+            self.objective,
+            recalibrated.iter().filter(of_bench),
+            &diagnosed.effects,
+            &bench.rig.undecided,
+        );
+        BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted, undecided }
     }
 
     /// Adds the hum of sensors that `model` leaves.
@@ -337,7 +355,7 @@ impl Case<'_> {
             .zip(&last.values)
             .zip(&last.stds)
             .map(|((free, value), std)| Recalibrated {
-                bench: free.bench(model).map(|bench| self.benches[bench].0.clone()),
+                bench: free.bench(model).map(|bench| self.benches[bench].0.name.clone()),
                 parameter: free.path(model),
                 nominal: free.start(),
                 fitted: *value,
@@ -416,11 +434,15 @@ impl Case<'_> {
         );
         let mut indistinguishable =
             crate::fit::identifiability::indistinguishable(objective, &last.model).unwrap_or_default();
-        indistinguishable.extend(off_centre::groups(
-            objective,
-            &recalibrated_parameters,
-            &last.model.effects,
-        ));
+        let benches = self.benches.iter();
+        let now: Vec<BenchNow> =
+            benches.map(|bench| self.now(bench, &last.model, &recalibrated_parameters, clock_s)).collect();
+        for undecided in now.iter().flat_map(|bench| &bench.undecided) {
+            let group = vec![undecided.parameter.clone(), format!("effects.{}", undecided.rival())];
+            if !indistinguishable.contains(&group) {
+                indistinguishable.push(group);
+            }
+        }
         let diagnosis = Diagnosis {
             schema: SCHEMA.to_owned(),
             verdict,
@@ -462,7 +484,7 @@ impl Case<'_> {
         Diagnosed {
             findings: Findings { diagnosis, traces, regimes: regimes::regimes(objective, stages) },
             experiments,
-            now: self.benches.iter().map(|(_, bench)| self.now(bench, &last.model, clock_s)).collect(),
+            now,
         }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Beside the sections of the format, some keys and a section may be given: `simulation.elements`, the number of
 //! slip elements into which a tendon is divided (1 to 64), `simulation.step_s`, the longest simulation step, and
-//! `[controller]`, the law of the position loop, for rigs where it is known.
+//! `[controller]`, the law of the position loop, for rigs where it is known. A diagnosis also writes `[[undecided]]`: values of the
+//! file that recordings did not settle, see [`Undecided`].
 //!
 //! `[replay]` may say more about what was recorded:
 //!
@@ -24,6 +25,7 @@ mod parse;
 mod plausible;
 mod roles;
 pub mod section;
+mod undecided;
 
 use std::path::Path;
 
@@ -39,6 +41,7 @@ pub use document::RigDocument;
 pub use parameter::{Assignment, ControllerParameter, RigParameter};
 pub use plausible::MINIMUM_SAMPLES;
 pub use roles::ReplayRoles;
+pub use undecided::Undecided;
 
 /// Value of `schema`.
 pub const SCHEMA: &str = "bowden-rig/1";
@@ -82,6 +85,8 @@ pub struct Rig {
     pub relative_inputs: Vec<Channel>,
     /// Inputs that are averaged without phase, and over which time, s.
     pub smoothing_s: Vec<(Channel, f64)>,
+    /// What the recordings behind the file's values did not settle.
+    pub undecided: Vec<Undecided>,
 }
 
 impl Rig {

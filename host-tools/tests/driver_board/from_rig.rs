@@ -159,6 +159,20 @@ fn what_the_board_cannot_use_is_said_with_the_reason() {
     assert_eq!(transfer.changes, []);
 }
 
+/// What another explanation would make wrong does not reach the board.
+#[test]
+fn the_board_keeps_what_the_recordings_did_not_settle() {
+    let settled = rig("", "").replace("output_radius_m = 0.015", "output_radius_m = 0.0146");
+    assert_eq!(changes(&settled), [("pulley.output_radius".to_owned(), 0.0146)]);
+    let undecided = "[[undecided]]\nparameter = \"pulleys.output_radius_m\"\nbefore = 0.015\n\
+                     effect = \"encoder_eccentricity\"\nchannel = \"theta_out_rad\"\n";
+    let text = settled + undecided;
+    assert_eq!(changes(&text), []);
+    let (transfer, _) = transfer(&text, &[]);
+    let unused = transfer.unused.iter().find(|unused| unused.source == "pulleys.output_radius_m").unwrap();
+    assert!(unused.reason.contains("encoder_eccentricity (theta_out_rad)"), "{}", unused.reason);
+}
+
 #[test]
 fn effects_become_corrections_of_the_board() {
     let text = rig(

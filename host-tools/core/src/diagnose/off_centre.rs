@@ -9,24 +9,37 @@ use bowden_model::effect::ActiveEffect;
 
 use super::verdict::Recalibrated;
 use crate::fit::objective::{Objective, Series};
+use crate::rig::Undecided;
 
 /// Parameters that set the ratio of both angles.
 const RADII: [&str; 2] = ["pulleys.input_radius_m", "pulleys.output_radius_m"];
 
-/// Groups of a wrong radius and the encoder whose disc would show the same, as far as the recordings tell.
-pub(super) fn groups(
+/// Effect of an encoder that is off its centre.
+const OFF_CENTRE: &str = "encoder_eccentricity";
+
+/// Wrong radii of a bench for which a disc off its centre would stand as well, as far as the recordings tell. What was undecided
+/// before them stays so where they do not decide it.
+pub(super) fn undecided<'r>(
     objective: &Objective,
-    recalibrated: &[Recalibrated],
+    recalibrated: impl Iterator<Item = &'r Recalibrated>,
     named: &[ActiveEffect],
-) -> Vec<Vec<String>> {
-    let is_wrong_radius =
-        |parameter: &&Recalibrated| RADII.contains(&parameter.parameter.as_str()) && parameter.is_wrong();
-    let off_centre = named.iter().any(|effect| effect.descriptor().id == "encoder_eccentricity");
-    let wrong = recalibrated.iter().filter(is_wrong_radius).filter(|_| !off_centre);
-    wrong
-        .filter(|radius| cannot_be_told(objective, radius.change().abs()))
-        .map(|radius| vec![radius.name(), "effects.encoder_eccentricity (theta_out_rad)".to_owned()])
-        .collect()
+    stated: &[Undecided],
+) -> Vec<Undecided> {
+    if named.iter().any(|effect| effect.descriptor().id == OFF_CENTRE) {
+        return Vec::new();
+    }
+    let of_radius = |radius: &Recalibrated| {
+        let before = stated.iter().find(|undecided| undecided.parameter == radius.parameter);
+        let before = before.map_or(radius.nominal, |undecided| undecided.before);
+        let radius = Recalibrated { nominal: before, ..radius.clone() };
+        (radius.is_wrong() && cannot_be_told(objective, radius.change().abs())).then_some(Undecided {
+            parameter: radius.parameter,
+            before,
+            effect: OFF_CENTRE,
+            channel: Some(Channel::ThetaOut),
+        })
+    };
+    recalibrated.filter(|radius| RADII.contains(&radius.parameter.as_str())).filter_map(of_radius).collect()
 }
 
 /// Whether a disc of the joint that is off by `amplitude_rad` leaves less than the angle's scale beside a straight line.
@@ -59,6 +72,50 @@ fn bend_of_a_sine(angles_rad: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::joint_model::JointModel;
+    use crate::test_bench;
+
+    /// A joint that swings by this angle, and what a fit says of its pulley of 15 mm, which is that of a rig file before it.
+    fn of_a_swing(travel_rad: f64, fitted: f64, nominal: f64, before: Option<f64>) -> Vec<Undecided> {
+        let mut recording = test_bench::swung(4000);
+        let wave = recording.channel(Channel::ThetaIn).unwrap().iter().map(|rad| rad / 0.4 * travel_rad);
+        let wave = wave.collect();
+        recording.set(Channel::ThetaOut, wave);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let radius = Recalibrated {
+            parameter: "pulleys.output_radius_m".into(),
+            bench: None,
+            nominal,
+            fitted,
+            std: Some(1e-6),
+            unit: "m".into(),
+            at_bound: false,
+        };
+        let stated = before.map(|before| Undecided {
+            parameter: radius.parameter.clone(),
+            before,
+            effect: OFF_CENTRE,
+            channel: Some(Channel::ThetaOut),
+        });
+        undecided(&objective, [&radius].into_iter(), &[], &Vec::from_iter(stated))
+    }
+
+    /// 3 % of a sine leave 0.1 mrad of a straight line over ±0.5 rad and 6 mrad over ±2 rad, by the formula below.
+    #[test]
+    fn a_wrong_radius_is_undecided_until_the_travel_is_long_enough() {
+        assert_eq!(of_a_swing(0.5, 0.01455, 0.015, None)[0].before, 0.015);
+        assert_eq!(of_a_swing(2.0, 0.01455, 0.015, None), []);
+        // No more than radii are off anyway.
+        assert_eq!(of_a_swing(0.5, 0.01499, 0.015, None), []);
+    }
+
+    #[test]
+    fn what_was_undecided_before_is_settled_by_a_long_travel_alone() {
+        assert_eq!(of_a_swing(0.5, 0.01455, 0.01455, None), []);
+        assert_eq!(of_a_swing(0.5, 0.01455, 0.01455, Some(0.015))[0].before, 0.015);
+        assert_eq!(of_a_swing(2.0, 0.01455, 0.01455, Some(0.015)), []);
+    }
 
     /// By hand: over angles spread evenly in ±a, `sin θ ≈ θ - θ³/6`, and the best line through a cube leaves `a³ sqrt(4/175)`.
     #[test]

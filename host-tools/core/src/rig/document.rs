@@ -8,7 +8,7 @@ use bowden_model::parameters::nominal;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
 
 use super::effects::CHANNEL_KEY;
-use super::{Rig, laws, read_text};
+use super::{Rig, Undecided, laws, read_text, undecided};
 use crate::outcome::Failure;
 use crate::output;
 
@@ -113,6 +113,11 @@ impl RigDocument {
             list.clear();
         }
         self.document.remove("effects");
+    }
+
+    /// States what recordings did not settle, in place of what the file says of it.
+    pub fn set_undecided(&mut self, all: &[Undecided]) {
+        undecided::replace(&mut self.document, all);
     }
 
     /// Writes the file.

@@ -10,11 +10,11 @@ use toml::de::{DeTable, DeValue};
 
 use super::roles::can_drive;
 use super::section::{Bounds, FINITE, Section, Source, advice};
-use super::{ProportionalLaw, Rig, SCHEMA, effects, laws};
+use super::{ProportionalLaw, Rig, SCHEMA, effects, laws, undecided};
 use crate::outcome::Failure;
 use crate::recording::{ColumnMap, ColumnSource, TIME_ROLE};
 
-const SECTIONS: [&str; 14] = [
+const SECTIONS: [&str; 15] = [
     "schema",
     "name",
     "motor",
@@ -26,6 +26,7 @@ const SECTIONS: [&str; 14] = [
     "simulation",
     "effects",
     laws::KEY,
+    undecided::KEY,
     "controller",
     "recording",
     "replay",
@@ -113,6 +114,7 @@ pub(super) fn parse(text: &str, name: &str) -> Result<Rig, Failure> {
         free_offsets: replay.free_offsets,
         relative_inputs: replay.relative_inputs,
         smoothing_s: replay.smoothing_s,
+        undecided: undecided::read(&file)?,
     })
 }
 

@@ -42,9 +42,15 @@ pub(super) fn carry(rig: &Rig, draft: &mut Draft) -> Vec<Unused> {
     let mut unused = Vec::new();
     for (parameter, (key, on_board)) in NOMINAL_PARAMETERS.iter().zip(&NOMINAL_ON_BOARD) {
         let Some(value) = parameter.get(&rig.joint) else { continue };
-        let drafted = match on_board {
-            Parameter(name) => draft.set(name, value, key),
-            NotUsed(reason) => Err((*reason).to_owned()),
+        let undecided = rig.undecided.iter().find(|undecided| undecided.parameter == *key);
+        let drafted = match (undecided, on_board) {
+            (Some(undecided), _) => Err(format!(
+                "the recordings do not tell it from {}, which would make the new value wrong; measure it, and remove \
+                 [[undecided]] from the rig",
+                undecided.rival()
+            )),
+            (None, Parameter(name)) => draft.set(name, value, key),
+            (None, NotUsed(reason)) => Err((*reason).to_owned()),
         };
         unused.extend(drafted.err().map(|reason| Unused { source: (*key).to_owned(), reason }));
     }

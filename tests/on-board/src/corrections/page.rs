@@ -103,8 +103,9 @@ pub fn page(rows: &[Row], provenance: &str) -> String {
          *Share of the gain* is what the diagnosis takes off over what the true physics take off. The goal is {:.0} % of it, and\n\
          never to be worse than before: {reached} of {} reach it.\n\n\
          An encoder of the joint that is off its centre at phase 0 shows 0.03 sin θ more. Over ±0.5 rad that is a slope of 0.03 to\n\
-         within 0.1 mrad, as of a pulley that is 3 % smaller (`a_short_travel_hardly_bends_a_sine`): the diagnosis says so\n\
-         (`indistinguishable`), keeps the pulley, which is the commoner of the two, and the board follows a wrong angle.\n\n{HEAD}\n{}\n\n\
+         within 0.1 mrad, as of a pulley that is 3 % smaller (`a_short_travel_hardly_bends_a_sine`). The diagnosis names the pulley, which\n\
+         is the commoner of the two, and says that it cannot tell them apart (`[[undecided]]`): the board keeps its radius, and gains\n\
+         nothing.\n\n{HEAD}\n{}\n\n\
          ## What the diagnosis said\n\n| effect | diagnosis |\n|---|---|\n{}\n",
         lacking(rows),
         kept(rows, provenance),
