@@ -197,12 +197,14 @@ impl Background<'_> {
     /// simulation tells.
     fn stronger(&self, judged: Judged) -> Screened {
         let Judged { start: mut best, mut linear } = judged;
+        let neutral = best.start.descriptor().neutral.unwrap_or(0.0);
+        let strength = |start: &Screened| (start.start.parameters[0] - neutral).abs();
         for _ in 0..STRENGTHENED {
             let Some(there) = linear.and_then(|linear| self.judge(linear.start)) else { break };
             if there.start.gain <= best.gain {
                 break;
             }
-            let asked = there.start.start.parameters[0] / best.start.parameters[0];
+            let asked = strength(&there.start) / strength(&best);
             best = there.start;
             if asked < 0.99 * STRONGEST {
                 break;
@@ -310,6 +312,8 @@ impl Basis {
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effect::Target;
     use bowden_model::effects::find;
 
     use super::*;
@@ -358,6 +362,18 @@ mod tests {
         let (found, _) = screened(&model, recording, &[], vec![start]);
         assert!((found.start.parameters[0] / strong - 1.0).abs() < 0.3, "{:?}", found.start.parameters[0]);
         assert!(found.gain > 0.8, "{}", found.gain);
+    }
+
+    /// An effect that does nothing at one and not at zero is made stronger too, from one tenth more to nine tenths.
+    #[test]
+    fn strength_is_counted_from_where_an_effect_does_nothing() {
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let gain = find("sensor_gain_error").unwrap();
+        let start = ActiveEffect { target: Target::One(Channel::F2), ..ActiveEffect::with_defaults(gain) };
+        record(&model, start.with("gain", 1.9), &mut recording);
+        let (found, _) = screened(&model, recording, &[], vec![start.with("gain", 1.1)]);
+        assert!((found.start.parameters[0] - 1.9).abs() < 0.05, "{:?}", found.start.parameters[0]);
     }
 
     /// A spring whose torque the recalibration took for that of half as much weight again.

@@ -41,15 +41,27 @@ pub(super) fn stated(
     let mut meaning = law.port().meaning().chars();
     let first: String = meaning.next().into_iter().flat_map(char::to_uppercase).collect();
     found.sentence = format!(
-        "{first}{}{}: {}. It {} {}; it removes {:.0} % of the difference on data the fit did not see.",
+        "{first}{}{}: {}. It {} {}; it removes {:.0} % of the difference on data the fit did not see.{}",
         meaning.as_str(),
         found.channel.as_ref().map_or_else(String::new, |channel| format!(" ({channel})")),
         in_numbers(&found),
         law.form().behaviour(),
         law.variable().name(),
-        100.0 * heldout_improvement
+        100.0 * heldout_improvement,
+        if is_loose(&found, descriptor.parameters[0].name) { LOOSE } else { "" }
     );
     found
+}
+
+/// What is to be known of a law with a coefficient that the data hardly tell.
+const LOOSE: &str = " Its strength is not known to a half, or a coefficient stands at the end of what is tried: coefficients make up for \
+                     each other, and only the curve is known, within the angles, speeds and tensions that were recorded.";
+
+/// Whether the strength is not known to a half of its value, or a coefficient is at the end of its range. A phase and a place may lie at
+/// zero.
+fn is_loose(law: &FoundLaw, strength: &str) -> bool {
+    let is_unknown = |c: &Estimate| c.std.is_some_and(|std| std > 0.5 * c.value.abs());
+    law.coefficients.values().any(|c| c.at_bound) || law.coefficients.get(strength).is_some_and(is_unknown)
 }
 
 /// Port, formula and coefficients in one line.
@@ -57,7 +69,10 @@ fn in_numbers(law: &FoundLaw) -> String {
     let mut text = format!("{} = {}", law.port, law.formula);
     for (place, (name, value)) in law.coefficients.iter().enumerate() {
         let before = if place == 0 { " with" } else { "," };
-        let spread = value.std.map_or_else(String::new, |std| format!(" ± {}", short(std)));
+        let spread = match value.std {
+            _ if value.at_bound => " (the end of what is tried)".to_owned(),
+            std => std.map_or_else(String::new, |std| format!(" ± {}", short(std))),
+        };
         let unit = if value.unit == "1" { String::new() } else { format!(" {}", value.unit) };
         // Writing to a String cannot fail.
         let _ = write!(text, "{before} {name} = {}{spread}{unit}", short(value.value));
@@ -92,4 +107,32 @@ pub(super) fn unexplained(
             sentences.join(" ")
         ),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::effect::Effect;
+    use bowden_model::law::LAWS;
+
+    use super::*;
+
+    /// The first law with an exponent, at this exponent, with this deviation of its amplitude as a part of it.
+    fn sentence(exponent: f64, amplitude_share: f64) -> String {
+        let of_power = |law: &&Law| law.descriptor().index_of("exponent").is_some();
+        let law = LAWS.iter().find(of_power).unwrap();
+        let active = ActiveEffect::with_defaults(law).with("exponent", exponent);
+        let stds = active.parameters.map(|value| Some(amplitude_share * value.abs()));
+        stated(law, &active, [2.0, 1.0], &stds).sentence
+    }
+
+    #[test]
+    fn a_coefficient_that_the_data_hardly_tell_is_said_to_be_one() {
+        let known = sentence(2.0, 0.1);
+        assert!(!known.contains("only the curve") && known.contains(" ± 0.200"), "{known}");
+        let loose = sentence(2.0, 0.7);
+        assert!(loose.ends_with(LOOSE), "{loose}");
+        let at_the_end = sentence(5.0, 0.1);
+        assert!(at_the_end.contains("exponent = 5.00 (the end of what is tried)"), "{at_the_end}");
+        assert!(at_the_end.ends_with(LOOSE));
+    }
 }

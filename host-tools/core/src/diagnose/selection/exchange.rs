@@ -3,6 +3,8 @@
 //! A name is chosen while others are still missing, and what it is chosen for may be a part of what they do: its rivals of that round are
 //! fitted in its place beside the others, one takes the place where it predicts better, and the odds of all are those of the end.
 
+use bowden_model::effect::ActiveEffect;
+
 use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further, remove};
 use crate::diagnose::words::is_listed;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -69,10 +71,11 @@ impl Search<'_> {
         present: &Fitted,
         chosen: &mut [Chosen],
     ) -> Result<Vec<Fitted>, Failure> {
-        let found: Vec<&str> = chosen.iter().map(|one| one.effect.descriptor().id).collect();
+        let found: Vec<ActiveEffect> = chosen.iter().map(|one| one.effect).collect();
         let loss_then = chosen[index].loss_after;
         let is_rival = |tried: &Tried| {
-            !found.contains(&tried.effect.descriptor().id) && is_listed(tried.heldout_loss / loss_then)
+            !found.iter().any(|found| found.is_beside(&tried.effect))
+                && is_listed(tried.heldout_loss / loss_then)
         };
         let (mut rivals, rest): (Vec<Tried>, Vec<Tried>) =
             std::mem::take(&mut chosen[index].others).into_iter().partition(is_rival);
