@@ -1,8 +1,8 @@
 //! One concealed effect of the virtual bench, fitted by the same effect of bowden's model.
 
-use bowden_core::fit::calibrated::recalibrated;
 use bowden_core::fit::free::Free;
 use bowden_core::fit::objective::{Objective, Part};
+use bowden_core::fit::recalibrated::recalibrated;
 use bowden_core::fit::solver::solve;
 use bowden_core::joint_model::JointModel;
 use bowden_core::rig::Rig;

@@ -3,6 +3,7 @@
 //! Nothing here runs in the control tick. The tick is reached through [`Port`], whose queues never make it wait.
 
 pub mod batcher;
+mod flash_map;
 mod shelf;
 pub mod store;
 pub mod table_store;
@@ -22,7 +23,8 @@ use crate::tick_config;
 use shelf::Shelf;
 
 pub use batcher::Batcher;
-pub use store::{ParameterStore, StoreError};
+pub use flash_map::StoreError;
+pub use store::ParameterStore;
 
 /// What the tick tells of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,8 +7,8 @@ use std::f64::consts::{PI, SQRT_2};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bowden_core::fit::calibrated::recalibrated;
 use bowden_core::fit::objective::{Objective, Part, Series};
+use bowden_core::fit::recalibrated::recalibrated;
 use bowden_core::fit::solver::solve;
 use bowden_core::joint_model::JointModel;
 use bowden_core::outcome::Failure;

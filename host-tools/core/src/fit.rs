@@ -6,6 +6,7 @@ pub mod identifiability;
 pub mod objective;
 pub mod observed;
 pub mod recalibrate;
+pub mod recalibrated;
 pub mod solver;
 pub mod typical;
 pub mod variation;

@@ -5,10 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::cross_target::Toolchain;
 use crate::debian;
 use crate::files::{make_folder, remove, write};
 use crate::process::output;
+use crate::toolchain::Toolchain;
 
 /// Libraries that a crate for the board links.
 const LIBRARIES: [&str; 3] = ["core", "alloc", "compiler_builtins"];

@@ -1,12 +1,13 @@
 //! The Rust target of the board's processor, on any machine: from rustup, or built from the sources of `core`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
 use crate::core_from_source;
 use crate::files::{make_folder, remove, write};
 use crate::process::{output, run_within, rustc, target_folder, workspace};
+use crate::toolchain::Toolchain;
 
 /// Cortex-M4 with its floating-point unit.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -15,38 +16,6 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 const PROBE: &str = "#![no_std]\nextern crate alloc;\n";
 /// Longest wait for rustup, which may look for a network that is not there.
 const RUSTUP_LIMIT: Duration = Duration::from_mins(5);
-
-/// The compiler that the workspace uses.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Toolchain {
-    /// Folder that holds its libraries under `lib/rustlib`.
-    pub sysroot: PathBuf,
-    /// Version, without `rustc` before it.
-    pub version: String,
-    /// Commit that it was built from.
-    pub commit: String,
-}
-
-impl Toolchain {
-    /// Asks rustc.
-    fn active() -> Result<Self, String> {
-        let sysroot = output(&mut rustc(&["--print", "sysroot"]))?;
-        Self::parse(sysroot.trim(), &output(&mut rustc(&["--version", "--verbose"]))?)
-    }
-
-    fn parse(sysroot: &str, verbose_version: &str) -> Result<Self, String> {
-        let value = |key: &str| {
-            let found = verbose_version.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(": "));
-            found.map(str::to_owned).ok_or_else(|| format!("`rustc --version --verbose` tells no {key}"))
-        };
-        Ok(Self { sysroot: sysroot.into(), version: value("release")?, commit: value("commit-hash")? })
-    }
-
-    /// Folder of the compiled libraries of a target.
-    pub fn libraries(&self, target: &str) -> PathBuf {
-        self.sysroot.join("lib/rustlib").join(target).join("lib")
-    }
-}
 
 /// Makes the active toolchain compile for the board.
 ///
@@ -108,20 +77,6 @@ fn compiles(folder: &Path) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const VERBOSE: &str = "rustc 1.95.0 (59807616e 2026-04-14)\nbinary: rustc\n\
-                           commit-hash: 59807616e1fa2540724bfbac14d7976d7e4a3860\ncommit-date: 2026-04-14\n\
-                           host: x86_64-unknown-linux-gnu\nrelease: 1.95.0\nLLVM version: 22.1.2\n";
-
-    #[test]
-    fn a_toolchain_is_read_from_what_rustc_says() {
-        let toolchain = Toolchain::parse("/opt/rust", VERBOSE).unwrap();
-        assert_eq!(toolchain.version, "1.95.0");
-        assert_eq!(toolchain.commit, "59807616e1fa2540724bfbac14d7976d7e4a3860");
-        assert_eq!(toolchain.libraries(TARGET), Path::new("/opt/rust/lib/rustlib/thumbv7em-none-eabihf/lib"));
-        let reason = Toolchain::parse("/opt/rust", "rustc 1.95.0\n").unwrap_err();
-        assert_eq!(reason, "`rustc --version --verbose` tells no release");
-    }
 
     #[test]
     fn a_missing_target_is_told_in_one_line_with_the_next_step() {

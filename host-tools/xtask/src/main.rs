@@ -19,6 +19,7 @@ mod prove;
 mod system_packages;
 mod tally;
 mod test;
+mod toolchain;
 
 use std::process::ExitCode;
 

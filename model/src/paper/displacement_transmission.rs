@@ -6,8 +6,8 @@
 use super::capstan::Direction;
 use super::error::{PaperError, finite};
 use super::pair::TendonPair;
+use super::phase::Regime;
 use super::torque::LoopTorque;
-use super::torque_transmission::Regime;
 
 /// Lag angle `phi = (r1/r2) theta_in - theta_out` of a pair that slips in `direction`, rad at the output: Eq. (20).
 ///

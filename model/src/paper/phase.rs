@@ -6,7 +6,15 @@
 //! between M and 2 M the holds last beyond `T_in` = 0 and D and G are skipped; up to M nothing slips.
 
 use super::capstan::Direction;
-use super::torque_transmission::Regime;
+
+/// Whether the output follows the input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regime {
+    /// Inside the friction band: the output stands.
+    Hold,
+    /// Both tendons slip and the pulleys turn this way.
+    Slip(Direction),
+}
 
 /// Where on the torque loop the pair is. + is the paper's clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,17 +3,8 @@
 use super::capstan::Direction;
 use super::error::{PaperError, finite};
 use super::pair::TendonPair;
-use super::phase::TorquePhase;
+use super::phase::{Regime, TorquePhase};
 use super::torque::LoopTorque;
-
-/// Whether the output follows the input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Regime {
-    /// Inside the friction band: the output stands.
-    Hold,
-    /// Both tendons slip and the pulleys turn this way.
-    Slip(Direction),
-}
 
 /// `M = 2 F0 r2 mu K`, N·m: friction torque of the pair at the output pulley, ≥ 0. Eq. (15)-(17).
 ///

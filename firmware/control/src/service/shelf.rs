@@ -3,7 +3,7 @@
 use bowden_link::FromBoard;
 use bowden_link::message::{Refusal, TABLE_CHUNK, TABLE_POINTS, TableHead, TableReport};
 
-use super::store::StoreError;
+use super::flash_map::StoreError;
 use crate::correction::ripple_table::RippleTable;
 
 /// Table that acts, and points that arrive.

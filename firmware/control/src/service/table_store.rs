@@ -8,7 +8,7 @@ use core::ops::Range;
 
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::store::{Map, StoreError, is_blank, map};
+use super::flash_map::{Map, StoreError, is_blank, map};
 use crate::correction::ripple_table::{RECORD, RippleTable};
 
 /// Keys: the head, and the two slots that it chooses from.

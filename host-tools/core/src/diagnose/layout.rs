@@ -10,8 +10,8 @@ use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 
-use crate::fit::calibrated::{own_of_effect, recalibrated, recalibrated_from};
 use crate::fit::free::Free;
+use crate::fit::recalibrated::{own_of_effect, recalibrated, recalibrated_from};
 use crate::joint_model::JointModel;
 
 /// An effect that every bench has a little of, told by its first parameter.

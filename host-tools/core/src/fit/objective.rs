@@ -13,6 +13,7 @@
 //! Tendons of the nominal model may push, amplifiers read from zero: where a recording lies on that zero and never below,
 //! predictions are cut there as well.
 
+mod block;
 mod blockwise;
 mod dataset;
 mod scale;
@@ -27,8 +28,9 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::recording::Recording;
 use crate::simulation::{Prediction, ReplayInput, replay_into};
-use blockwise::{Blockwise, Moments, moments_of};
-pub use dataset::Block;
+pub use block::Block;
+use block::{Moments, moments_of};
+use blockwise::Blockwise;
 use dataset::Dataset;
 pub use scale::{loss, soft};
 use scale::{noise_variance, scale_of};

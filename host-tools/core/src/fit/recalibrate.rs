@@ -1,9 +1,9 @@
 //! Recalibration of a rig: its nominal parameters fitted to all samples of recordings, and what stays unknown.
 
-use super::calibrated::{own_of_effect, recalibrated};
 use super::identifiability::{Group, Sensitivity};
 use super::objective::{Objective, Part, Series};
 use super::observed::Use;
+use super::recalibrated::{own_of_effect, recalibrated};
 use super::solver::solve;
 use super::variation::Variation;
 use crate::joint_model::JointModel;

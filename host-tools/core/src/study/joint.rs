@@ -152,7 +152,7 @@ mod tests {
     use bowden_model::effects::find;
 
     use super::*;
-    use crate::fit::calibrated::recalibrated;
+    use crate::fit::recalibrated::recalibrated;
     use crate::rig::Rig;
     use crate::test_bench;
 

@@ -3,27 +3,9 @@
 use bowden_model::channel::Channel;
 
 use super::Series;
-use super::dataset::{Block, Dataset};
+use super::block::{Moments, moments};
+use super::dataset::Dataset;
 use crate::simulation::Sink;
-
-/// Of the samples of one block.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Moments {
-    pub(super) mean: f64,
-    pub(super) variance: f64,
-}
-
-pub(super) fn moments(values: &[f64]) -> Moments {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    Moments { mean, variance }
-}
-
-/// One entry a block.
-pub(super) fn moments_of(values: &[f64], blocks: &[Block]) -> Vec<Moments> {
-    blocks.iter().map(|block| moments(&values[block.start..block.end])).collect()
-}
 
 /// Takes a replay block by block: a fit needs no more of it, and an hour of samples would not fit into memory once a thread.
 pub(super) struct Blockwise<'a> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bowden_model::channel::Channel;
 
-use super::blockwise::{Moments, moments_of};
+use super::block::{Block, Moments, moments_of};
 use super::{Part, Series};
 use crate::fit::variation::Variation;
 use crate::joint_model::{Drive, JointModel};
@@ -28,17 +28,6 @@ const STRETCH_S: f64 = 1.0;
 
 /// Samples on zero from which on an amplifier of tension is taken to have stood at its end.
 const SAMPLES_AT_ZERO: usize = 20;
-
-/// Samples that are compared as one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
-    /// First sample.
-    pub start: usize,
-    /// One past the last sample.
-    pub end: usize,
-    /// Use of the block.
-    pub part: Part,
-}
 
 /// The recording.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use bowden_model::channel::Channel;
 use bowden_model::drive::pulley_stall_torque_nm;
 
 use super::Series;
-use super::blockwise::moments;
+use super::block::moments;
 use super::dataset::Dataset;
 use crate::joint_model::JointModel;
 use crate::reconstruct::quantum_of;
