@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use bowden_core::diagnose::verdict::Diagnosis;
 use bowden_core::fit::recalibrate::recalibrate;
 use bowden_core::progress::Quiet;
 use bowden_core::recording::{ReadOptions, Recording};
@@ -248,6 +249,12 @@ fn the_servos_study_names_the_friction_of_its_gear() {
         bowden(folder, &["diagnose", study.to_str().unwrap(), "--out", "out", "--quiet"]);
     assert_eq!((status, errors.as_str()), (0, ""));
     let text = fs::read_to_string(folder.join("out/diagnosis.json")).unwrap();
+    let read: Diagnosis = serde_json::from_str(&text).unwrap();
+    assert_eq!(
+        serde_json::to_string_pretty(&read).unwrap(),
+        text.trim_end(),
+        "a diagnosis reads what it writes"
+    );
     let diagnosis: serde_json::Value = serde_json::from_str(&text).unwrap();
     let [named] = diagnosis["effects"].as_array().unwrap().as_slice() else { panic!("{text}") };
     assert_eq!(named["id"], "gear_load_friction");

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::fit::calibrated::wrong_from;
 
@@ -10,7 +10,7 @@ use crate::fit::calibrated::wrong_from;
 pub const SCHEMA: &str = "bowden-diagnosis/1";
 
 /// The diagnosis in one word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing worth adding or changing.
@@ -24,7 +24,7 @@ pub enum Verdict {
 }
 
 /// A fitted number with its uncertainty.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Value, SI.
     pub value: f64,
@@ -37,7 +37,7 @@ pub struct Estimate {
 }
 
 /// An effect that could not be excluded beside the named one.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rival {
     /// Identifier.
     pub id: String,
@@ -48,7 +48,7 @@ pub struct Rival {
 }
 
 /// An effect that the diagnosis stands behind.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedEffect {
     /// Identifier.
     pub id: String,
@@ -63,7 +63,7 @@ pub struct NamedEffect {
     /// Fitted parameters; of the strongest instance where the part has several.
     pub parameters: BTreeMap<String, Estimate>,
     /// Fitted parameters of the other instances, strongest first: the harmonics of cogging beside the strongest.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further: Vec<BTreeMap<String, Estimate>>,
     /// Part of the held-out loss that it removes, 0 to 1.
     pub heldout_improvement: f64,
@@ -74,7 +74,7 @@ pub struct NamedEffect {
 }
 
 /// A nominal parameter after recalibration.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recalibrated {
     /// `section.name`.
     pub parameter: String,
@@ -121,7 +121,7 @@ impl Recalibrated {
 }
 
 /// Where recalibrated simulation and recording differ.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mismatch {
     /// Part of the joint.
     pub component: String,
@@ -138,7 +138,7 @@ pub struct Mismatch {
 }
 
 /// Variable over which a map is drawn.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapAxis {
     /// `theta_rad`, the angle of the input pulley, or of the joint where that is not recorded; `omega_rad_s`, its speed;
     /// `tension_n`, the largest recorded tension; `t_s`, the time that the recordings take one after the other.
@@ -150,7 +150,7 @@ pub struct MapAxis {
 }
 
 /// Differences of one channel over every axis of a map.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapChannel {
     /// Channel, or `motor_torque_nm`.
     pub channel: String,
@@ -163,7 +163,7 @@ pub struct MapChannel {
 }
 
 /// Where in position, speed, tension and time simulation and recording differ.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ResidualMap {
     /// Variables.
     pub axes: Vec<MapAxis>,
@@ -172,7 +172,7 @@ pub struct ResidualMap {
 }
 
 /// Structure that no named effect explains.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
     /// Part of the joint.
     pub component: String,
@@ -195,7 +195,7 @@ pub struct Unexplained {
 }
 
 /// Physics without a name that the diagnosis stands behind: a closed form at one port of the joint.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundLaw {
     /// Part of the joint.
     pub component: String,
@@ -216,7 +216,7 @@ pub struct FoundLaw {
 }
 
 /// A curve or wave over one variable, fitted to what is left of the channel named beside it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FreeForm {
     /// Variable along which it runs.
     pub variable: String,
@@ -240,7 +240,7 @@ pub struct FreeForm {
 }
 
 /// Differences of one channel, root mean square, in its unit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChannelFit {
     /// With the rig as it was.
     pub before_rmse: f64,
@@ -253,7 +253,7 @@ pub struct ChannelFit {
 }
 
 /// Scores on data that the fit did not see.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Always true: the scores are held out.
     pub heldout: bool,
@@ -262,7 +262,7 @@ pub struct Fit {
 }
 
 /// An effect that was tried in one round of the search.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Attempt {
     /// Identifier.
     pub id: String,
@@ -277,7 +277,7 @@ pub struct Attempt {
 }
 
 /// One round of the search: every effect of the catalogue beside those that were chosen before.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchRound {
     /// Held-out loss before it.
     pub loss_before: f64,
@@ -286,7 +286,7 @@ pub struct SearchRound {
 }
 
 /// An effect that every bench has a little of: carried along in the search, not named, not in the diagnosed rig.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OrdinaryEffect {
     /// Identifier.
     pub id: String,
@@ -295,7 +295,7 @@ pub struct OrdinaryEffect {
 }
 
 /// Mean loss on held-out data, in squared scales; 1 where every residual is one scale.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutLoss {
     /// With the rig as it was.
     pub before: f64,
@@ -306,7 +306,7 @@ pub struct HeldOutLoss {
 }
 
 /// One diagnosis.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// [`SCHEMA`].
     pub schema: String,
