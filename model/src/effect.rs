@@ -6,7 +6,7 @@
 
 use crate::channel::Channel;
 use crate::friction_law::FrictionLaw;
-use crate::search::{Aftermath, Starts, is_weak};
+use crate::search::{Aftermath, Ordinary, Starts, is_weak};
 
 /// Largest number of parameters that one effect may have.
 pub const MAX_PARAMETERS: usize = 6;
@@ -334,6 +334,11 @@ pub trait Effect: Sync {
     fn is_looked_for_on(&self, channel: Channel, drives: bool) -> bool {
         let _ = channel;
         !drives
+    }
+
+    /// How much of it every bench has; `None` where it has none of itself. A search carries that along and does not name it.
+    fn ordinary(&self) -> Option<Ordinary> {
+        None
     }
 
     /// Whether one converter may give it to all tensions at once.

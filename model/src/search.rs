@@ -1,5 +1,5 @@
 //! What a search for missing physics has to know of an effect: where it starts from, when there is hardly any of it, what is left
-//! when the recordings are over.
+//! when the recordings are over, how much of it every bench has.
 
 use crate::channel::Channel;
 
@@ -28,6 +28,26 @@ pub enum Starts {
     LargestShown,
     /// From both ends of the joint's travel.
     EndsOfTravel,
+}
+
+/// How much of an effect every bench has, of which nobody would say that it has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ordinary {
+    /// What the strengths are counted in.
+    pub unit: OrdinaryUnit,
+    /// Usual strength.
+    pub usual: f64,
+    /// Largest strength that is not worth a name.
+    pub largest: f64,
+}
+
+/// What an ordinary strength is counted in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OrdinaryUnit {
+    /// The effect's own unit, on benches with a tendon in a sheath.
+    OfSheath,
+    /// The motor's stall torque at the input pulley.
+    StallTorque,
 }
 
 /// What an effect leaves when the recordings are over.

@@ -3,6 +3,7 @@
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING, ParameterSpec,
 };
+use crate::search::{Ordinary, OrdinaryUnit};
 
 /// Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
 pub struct MotorCoulombFriction;
@@ -22,6 +23,11 @@ static DESCRIPTOR: Descriptor = Descriptor {
 impl Effect for MotorCoulombFriction {
     fn descriptor(&self) -> &'static Descriptor {
         &DESCRIPTOR
+    }
+
+    /// What bearings and teeth hold back.
+    fn ordinary(&self) -> Option<Ordinary> {
+        Some(Ordinary { unit: OrdinaryUnit::StallTorque, usual: 4e-4, largest: 1.5e-3 })
     }
 
     fn told_apart_by(&self) -> Option<&'static str> {

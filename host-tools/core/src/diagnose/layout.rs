@@ -6,20 +6,16 @@
 //! search therefore carries them along at ordinary size, fits them, and names nothing for them: what they take off can no
 //! longer hide a weak effect, nor be mistaken for one. The diagnosed rig does not contain them.
 
+use std::sync::LazyLock;
+
 use bowden_model::drive::pulley_stall_torque_nm;
-use bowden_model::effect::ActiveEffect;
-use bowden_model::effects::find;
+use bowden_model::effect::{ActiveEffect, Effect};
+use bowden_model::effects::CATALOGUE;
+use bowden_model::search::{Ordinary, OrdinaryUnit};
 
 use crate::fit::free::Free;
 use crate::fit::recalibrated::{own_of_effect, recalibrated, recalibrated_from};
 use crate::joint_model::JointModel;
-
-/// An effect that every bench has a little of, told by its first parameter.
-struct Ordinary {
-    id: &'static str,
-    /// Usual size in a model, and the largest that is not worth a name; `None` where the model cannot have it.
-    sizes: fn(&JointModel) -> Option<[f64; 2]>,
-}
 
 /// Standard deviation of the logarithm of an ordinary size.
 const SPREAD: f64 = 0.5;
@@ -27,35 +23,28 @@ const SPREAD: f64 = 0.5;
 /// Part of its largest size at which an ordinary effect counts as that large.
 const EXHAUSTED: f64 = 0.99;
 
-static ORDINARY: [Ordinary; 2] = [
-    // Travel of a contact before it slips, m: 6 to 16 µm came out of virtual benches, whose bristles give way over 7.5 µm.
-    Ordinary {
-        id: "presliding_compliance",
-        sizes: |model| {
-            (model.parameters.tendon.is_some() && model.parameters.sheath.is_some()).then_some([1e-5, 4e-5])
-        },
-    },
-    // A part of the stall torque at the input pulley: what bearings and teeth hold back.
-    Ordinary {
-        id: "motor_coulomb_friction",
-        sizes: |model| {
-            let stall_nm = pulley_stall_torque_nm(&model.parameters.motor?);
-            Some([4e-4, 1.5e-3].map(|share| share * stall_nm))
-        },
-    },
-];
+/// The effects that every bench has a little of, told by their first parameter, from the joint's side to the motor's.
+static ORDINARY: LazyLock<Vec<&'static dyn Effect>> =
+    LazyLock::new(|| CATALOGUE.into_iter().rev().filter(|effect| effect.ordinary().is_some()).collect());
 
-impl Ordinary {
-    /// Whether it has a place beside what was found.
-    fn stands_beside(&self, found: &[ActiveEffect]) -> bool {
-        found.iter().all(|effect| effect.descriptor().id != self.id)
-    }
+/// How much of an effect every bench like `model` has, in the effect's unit; `None` where the model cannot have it.
+fn ordinary_in(model: &JointModel, effect: &dyn Effect) -> Option<Ordinary> {
+    let Ordinary { unit, usual, largest } = effect.ordinary()?;
+    let one = match unit {
+        OrdinaryUnit::OfSheath => model.parameters.tendon.and(model.parameters.sheath).map(|_| 1.0),
+        OrdinaryUnit::StallTorque => model.parameters.motor.as_ref().map(pulley_stall_torque_nm),
+    }?;
+    Some(Ordinary { unit, usual: usual * one, largest: largest * one })
+}
+
+/// Whether something ordinary has a place beside what was found.
+fn stands_beside(effect: &dyn Effect, found: &[ActiveEffect]) -> bool {
+    found.iter().all(|found| found.descriptor().id != effect.descriptor().id)
 }
 
 /// Largest strength of an effect that is not worth a name; `None` for one that no bench has of itself.
-pub(super) fn largest_ordinary(believed: &JointModel, id: &str) -> Option<f64> {
-    let ordinary = ORDINARY.iter().find(|ordinary| ordinary.id == id)?;
-    (ordinary.sizes)(believed).map(|[_, largest]| largest)
+pub(super) fn largest_ordinary(believed: &JointModel, effect: &dyn Effect) -> Option<f64> {
+    ordinary_in(believed, effect).map(|ordinary| ordinary.largest)
 }
 
 /// Order of the effects of a searched model.
@@ -75,15 +64,15 @@ impl Layout {
     /// `model` with every ordinary effect that it lacks and that has a place beside what the rig states and what was found.
     pub(super) fn with_ordinary(&self, model: &JointModel) -> (Self, JointModel) {
         let (mut layout, mut with) = (self.clone(), model.clone());
-        for (place, usual) in ORDINARY.iter().enumerate() {
-            let stated = model.effects[..self.own].iter().any(|effect| effect.descriptor().id == usual.id);
+        for (place, effect) in ORDINARY.iter().enumerate() {
+            let is_stated = !stands_beside(*effect, &model.effects[..self.own]);
             let found = &model.effects[self.first_found()..];
-            if stated || self.ordinary.contains(&place) || !usual.stands_beside(found) {
+            if is_stated || self.ordinary.contains(&place) || !stands_beside(*effect, found) {
                 continue;
             }
-            if let (Some([size, _]), Some(effect)) = ((usual.sizes)(model), find(usual.id)) {
-                let mut effect = ActiveEffect::with_defaults(effect);
-                effect.parameters[0] = size;
+            if let Some(Ordinary { usual, .. }) = ordinary_in(model, *effect) {
+                let mut effect = ActiveEffect::with_defaults(*effect);
+                effect.parameters[0] = usual;
                 let index = layout.ordinary.partition_point(|other| *other < place);
                 layout.ordinary.insert(index, place);
                 with.effects.insert(self.own + index, effect);
@@ -113,7 +102,7 @@ impl Layout {
     pub(super) fn with(&self, model: &JointModel, effect: ActiveEffect) -> (Self, JointModel) {
         let (mut layout, mut with) = (self.clone(), model.clone());
         for index in (0..self.ordinary.len()).rev() {
-            if !ORDINARY[self.ordinary[index]].stands_beside(&[effect]) {
+            if !stands_beside(ORDINARY[self.ordinary[index]], &[effect]) {
                 layout.ordinary.remove(index);
                 with.effects.remove(self.own + index);
             }
@@ -139,7 +128,7 @@ impl Layout {
         let (mut layout, mut without) = (self.clone(), model.clone());
         for index in (0..self.ordinary.len()).rev() {
             let effect = &model.effects[self.own + index];
-            let largest = largest_ordinary(believed, effect.descriptor().id);
+            let largest = largest_ordinary(believed, effect.effect);
             if largest.is_some_and(|largest| effect.parameters[0] >= EXHAUSTED * largest) {
                 layout.ordinary.remove(index);
                 without.effects.remove(self.own + index);
@@ -161,10 +150,10 @@ impl Layout {
         let mut free = recalibrated_from(believed, model);
         free.extend(self.stated(model));
         for (index, place) in self.ordinary.iter().enumerate() {
-            if let (Some([size, largest]), Some(parameter)) =
-                ((ORDINARY[*place].sizes)(believed), Free::effect(model, self.own + index, 0))
+            if let (Some(Ordinary { usual, largest, .. }), Some(parameter)) =
+                (ordinary_in(believed, ORDINARY[*place]), Free::effect(model, self.own + index, 0))
             {
-                free.push(parameter.as_ratio().up_to(largest).believed_within(size, SPREAD));
+                free.push(parameter.as_ratio().up_to(largest).believed_within(usual, SPREAD));
             }
         }
         for effect in self.first_found()..model.effects.len() {
@@ -196,6 +185,7 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use bowden_model::channel::Channel;
+    use bowden_model::effects::find;
 
     use super::*;
     use crate::recording::Recording;
@@ -298,7 +288,7 @@ mod tests {
             ("motor_coulomb_friction.torque_nm", 4e-4 * STALL_NM, 1.5e-3 * STALL_NM),
         ] {
             let free = of(path);
-            let limit = largest_ordinary(&bench, path.split('.').next().unwrap()).unwrap();
+            let limit = largest_ordinary(&bench, find(path.split('.').next().unwrap()).unwrap()).unwrap();
             assert!((limit / largest - 1.0).abs() < 1e-9, "{path}: {limit}");
             assert!((free.value_at(0.0) / usual - 1.0).abs() < 1e-9, "{path}");
             assert!((free.value_at(10.0) / largest - 1.0).abs() < 1e-9, "{path}: {}", free.value_at(10.0));

@@ -467,7 +467,7 @@ fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffec
     let descriptor = effect.descriptor();
     let Some(strength) = descriptor.parameters.first() else { return false };
     let usual = typical(believed, descriptor.component, strength);
-    largest_ordinary(believed, descriptor.id).is_some_and(|largest| effect.parameters[0] <= largest)
+    largest_ordinary(believed, effect.effect).is_some_and(|largest| effect.parameters[0] <= largest)
         || too_little_travel(objective, effect)
         || effect.effect.is_hardly_there(&effect.parameters, usual)
 }

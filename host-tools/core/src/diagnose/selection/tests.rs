@@ -66,7 +66,7 @@ fn what_every_bench_has_and_what_the_travel_does_not_show_has_no_name() {
     let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
     let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
     let friction = |share: f64| {
-        let largest_nm = largest_ordinary(&bench, "motor_coulomb_friction").unwrap();
+        let largest_nm = largest_ordinary(&bench, find("motor_coulomb_friction").unwrap()).unwrap();
         ActiveEffect::with_defaults(find("motor_coulomb_friction").unwrap())
             .with("torque_nm", share * largest_nm)
     };
