@@ -10,6 +10,7 @@
 mod afterwards;
 mod candidates;
 mod constancy;
+mod decide;
 mod experiment;
 mod hum;
 mod law_candidates;
@@ -18,6 +19,7 @@ mod locked;
 mod off_centre;
 mod onset;
 mod place;
+pub mod policy;
 mod regimes;
 mod residual_map;
 mod screening;
@@ -46,15 +48,17 @@ use crate::recording::Recording;
 use crate::rig::{Rig, RigDocument, RigParameter, Undecided};
 use crate::study::{Bench, Role, Study};
 use afterwards::afterwards;
+use decide::{Evidence, decide};
 use experiment::{Bearable, Shown};
 pub use experiment::{Experiment, SECONDS as EXPERIMENT_S};
 use hum::Hum;
 use layout::Layout;
+use policy::POLICY;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use stages::{Stage, Stages};
 use verdict::{
     Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, HeldOutLoss, NamedEffect, OrdinaryEffect,
-    Recalibrated, SCHEMA, SearchRound, Trace, Unexplained, Verdict,
+    Recalibrated, SCHEMA, SearchRound, Trace, Unexplained,
 };
 
 /// Contacts of each tendon while candidates are tried: as many as keep the trapezoidal error `(μK)² / 12 n²` of its
@@ -66,11 +70,6 @@ const SEARCH_ELEMENTS: std::ops::RangeInclusive<usize> = 4..=8;
 
 /// Simulation step while candidates are tried, s.
 const SEARCH_STEP_S: f64 = 1e-3;
-
-/// Share of the held-out loss of the recalibrated rig that the diagnosed one must take off, for what was found to be said
-/// (`heldout_loss` in each `diagnosis.json` of `prove`): far below it lies what imitates the rest of an ordinary bench, above it
-/// what is there.
-const PAYING_SHARE: f64 = 0.05;
 
 /// Optimiser evaluations per parameter of the last fit.
 const FINAL_PATIENCE: usize = 8;
@@ -215,7 +214,7 @@ impl Case<'_> {
         let recalibrated = Stage::of(objective, &at_full_resolution(&selected.baseline.model, model))?;
         if selected.complete
             && !selected.chosen.is_empty()
-            && !pays(
+            && !POLICY.pays(
                 recalibrated.heldout_loss(objective),
                 objective.mean_loss(&last.residuals, Part::HeldOut),
             )
@@ -240,11 +239,6 @@ impl Case<'_> {
         let left = Left { hums, unexplained };
         Ok(self.report(&selected, &last, &stages, left, traces))
     }
-}
-
-/// Whether the diagnosed rig, which stands without what is ordinary, predicts held-out data better than the recalibrated one.
-fn pays(recalibrated: f64, diagnosed: f64) -> bool {
-    recalibrated - diagnosed > PAYING_SHARE * recalibrated
 }
 
 /// Contacts that are enough while candidates are tried.
@@ -403,14 +397,14 @@ impl Case<'_> {
         let wrong = recalibrated_parameters.iter().any(Recalibrated::is_wrong);
         let [loss_before, loss_recalibrated, loss_after] =
             [&stages.before, &stages.recalibrated, &stages.after].map(|stage| stage.heldout_loss(objective));
-        let verdict = match (&effects[..], &unexplained) {
-            ([_, ..], _) => Verdict::MissingPhysics,
-            ([], Some(_)) => Verdict::Unexplained,
-            ([], None) if wrong && selection::worthwhile(loss_before, loss_recalibrated) => {
-                Verdict::Recalibrate
-            }
-            ([], None) => Verdict::Consistent,
+        let evidence = Evidence {
+            names: effects.len(),
+            structure_is_left: unexplained.is_some(),
+            parameters_are_wrong: wrong,
+            loss_before,
+            loss_recalibrated,
         };
+        let verdict = decide(&evidence, &POLICY);
         let channels: BTreeMap<String, ChannelFit> = objective
             .scales()
             .iter()
@@ -469,6 +463,7 @@ impl Case<'_> {
                     parameters: values_of(effect),
                 })
                 .collect(),
+            policy: POLICY,
             search: selected.rounds.iter().map(search_round).collect(),
             rig: self.name.to_owned(),
             recordings: training.iter().map(|r| r.source().to_owned()).collect(),
@@ -563,17 +558,4 @@ fn search_round(round: &Round) -> SearchRound {
         heldout_loss: *heldout_loss,
     };
     SearchRound { loss_before: round.loss_before, tried: round.candidates.iter().map(attempt).collect() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::pays;
-
-    #[test]
-    fn physics_pays_by_its_share_of_the_held_out_loss() {
-        for scale in [0.01, 1.0, 100.0] {
-            assert!(pays(scale, 0.94 * scale) && !pays(scale, 0.96 * scale), "scale {scale}");
-        }
-        assert!(!pays(1.0, 1.1), "worse than without");
-    }
 }

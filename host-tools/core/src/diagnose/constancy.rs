@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::place::component_of;
-use super::selection::worthwhile;
+use super::policy::POLICY;
 use super::verdict::Unexplained;
 use crate::fit::objective::{Objective, Part, Residuals, Series, loss};
 
@@ -15,7 +15,7 @@ pub(super) fn inconstant(
     fitted: &Residuals,
 ) -> Option<Unexplained> {
     let [kept, moved] = [stated, fitted].map(|residuals| objective.mean_loss(residuals, Part::HeldOut));
-    if !worthwhile(moved, kept) {
+    if !POLICY.worth_naming(moved, kept) {
         return None;
     }
     let mut worse: BTreeMap<Series, f64> = BTreeMap::new();

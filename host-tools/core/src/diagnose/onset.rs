@@ -2,7 +2,7 @@
 
 use bowden_model::effect::ActiveEffect;
 
-use super::selection::worthwhile;
+use super::policy::POLICY;
 use crate::fit::free::is_moment;
 use crate::fit::objective::{Objective, Part};
 use crate::joint_model::JointModel;
@@ -36,7 +36,7 @@ pub(super) fn between_recordings(
         for border_s in running.input(recording).clock_s() {
             let mut moved = model.clone();
             moved.effects[index].parameters[moment] = border_s;
-            worse &= worthwhile(loss(&moved)?, fitted);
+            worse &= POLICY.worth_naming(loss(&moved)?, fitted);
         }
         if worse {
             return Ok(false);

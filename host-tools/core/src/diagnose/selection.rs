@@ -13,29 +13,13 @@ use rayon::prelude::*;
 
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
+use super::policy::POLICY;
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::typical::typical;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
-
-/// Share of the held-out loss that an effect must remove: what two realities differ by is not all ordinary contact and
-/// friction, and effects that imitate the rest remove a part of it.
-pub const WORTHWHILE_SHARE: f64 = 0.15;
-
-/// Loss, in squared scales, from which on more is left than noise and an ordinary bench leave: every residual beyond the three
-/// scales at which the loss bends.
-const MUCH_LEFT: f64 = 10.0;
-
-/// Loss, in squared scales, that an effect must remove whatever the share. On fifty virtual benches that hide nothing
-/// (`prove`, groups `nothing` and `parameters`) candidates remove up to 0.04, as `search` in their `diagnosis.json` tells, but
-/// for friction of the sheath that falls at a crawl (`sheath_stribeck_friction`), up to 0.27, and for one bench, up to 0.20, where the
-/// rig that would be written does not gain by it.
-pub const WORTHWHILE_LOSS: f64 = 0.1;
-
-/// Advantage in held-out loss that each further parameter must earn between two candidates.
-const LOSS_PER_PARAMETER: f64 = 0.03;
 
 /// Candidates whose fit is brought to an end, of those that fit best so far.
 const FINALISTS: usize = 3;
@@ -210,6 +194,14 @@ struct Losses {
 /// Whether what brings the held-out loss from one value to another is worth it.
 type Worth = fn(f64, f64) -> bool;
 
+fn worth_naming(before: f64, after: f64) -> bool {
+    POLICY.worth_naming(before, after)
+}
+
+fn worth_stating(before: f64, after: f64) -> bool {
+    POLICY.worth_stating(before, after)
+}
+
 /// What a round tries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -304,7 +296,7 @@ impl Search<'_> {
             let before = self.without_exhausted(present)?;
             let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
-            let Some((found, with)) = self.found(&before, present, fits, worthwhile)? else { break };
+            let Some((found, with)) = self.found(&before, present, fits, worth_naming)? else { break };
             chosen.push(found);
             *present = with;
             self.add_instances(present, chosen)?;
@@ -396,7 +388,7 @@ impl Search<'_> {
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             let bare_loss = self.without_exhausted(&rest)?.loss;
             self.progress.advance(1);
-            if worthwhile(bare_loss, present.loss) {
+            if worth_naming(bare_loss, present.loss) {
                 chosen[index].stands(bare_loss, present.loss);
                 index += 1;
             } else {
@@ -442,23 +434,11 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
     }
 }
 
-/// Factor of the held-out loss with an effect: its parameters count, and a form that is not the usual one must be worth its choice as
-/// a name must.
+/// Factor of the held-out loss with an effect, where candidates are compared.
 fn handicap(effect: &ActiveEffect) -> f64 {
     let parameters = effect.descriptor().parameters;
     let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
-    let share = if parameters.iter().zip(effect.parameters).any(unusual) { WORTHWHILE_SHARE } else { 0.0 };
-    (1.0 + LOSS_PER_PARAMETER * parameters.len() as f64) / (1.0 - share)
-}
-
-/// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.
-///
-/// Where what is left stands far above what an ordinary bench leaves, other physics is missing too, and what takes a little off
-/// may only imitate it: every factor of a hundred beyond [`MUCH_LEFT`] asks for [`WORTHWHILE_SHARE`] more.
-#[must_use]
-pub fn worthwhile(before: f64, after: f64) -> bool {
-    let share = WORTHWHILE_SHARE * (1.0 + 0.5 * (after / MUCH_LEFT).log10().max(0.0));
-    before - after > WORTHWHILE_LOSS && before - after > share * before
+    POLICY.handicap(parameters.len(), !parameters.iter().zip(effect.parameters).any(unusual))
 }
 
 /// Whether an effect was fitted so weak that it is hardly there, or no more than every bench has, or shows too little of itself

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::policy::{POLICY, Policy};
 use crate::fit::calibrated::wrong_from;
 
 /// Value of `schema`.
@@ -93,9 +94,6 @@ pub struct Recalibrated {
     pub at_bound: bool,
 }
 
-/// Standard deviations by which a wrong parameter is off at least.
-const SURE: f64 = 3.0;
-
 impl Recalibrated {
     /// Name of the parameter, with the bench that has it for itself.
     #[must_use]
@@ -115,7 +113,7 @@ impl Recalibrated {
     /// Whether the rig file is wrong about it, and not just by what benches usually are.
     #[must_use]
     pub fn is_wrong(&self) -> bool {
-        let is_sure = self.std.is_none_or(|std| (self.fitted - self.nominal).abs() > SURE * std);
+        let is_sure = self.std.is_none_or(|std| (self.fitted - self.nominal).abs() > POLICY.sure_stds * std);
         is_sure && self.change().abs() > wrong_from(&self.parameter)
     }
 }
@@ -336,6 +334,8 @@ pub struct Diagnosis {
     pub heldout_loss: HeldOutLoss,
     /// What every bench has a little of, as it was carried along in the search.
     pub ordinary: Vec<OrdinaryEffect>,
+    /// By which numbers losses became names and verdict.
+    pub policy: Policy,
     /// What was tried, round by round, beside what is ordinary.
     pub search: Vec<SearchRound>,
     /// Name of the rig.

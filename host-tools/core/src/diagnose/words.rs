@@ -4,19 +4,10 @@ use std::fmt::Write;
 
 use bowden_model::effect::{ActiveEffect, Component, ParameterSpec};
 
+use super::policy::POLICY;
 use super::selection::{Chosen, Tried};
 use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
 use crate::fit::calibrated::wrong_from;
-
-/// Sharpness with which a ratio of held-out losses turns into odds: a candidate that leaves a fifth more is six times
-/// less likely.
-const ODDS_PER_LOSS_RATIO: f64 = 10.0;
-
-/// Improvement at which an effect is as likely as not.
-const EVEN_IMPROVEMENT: f64 = 0.1;
-
-/// Odds below which a rival is not listed.
-const LISTED_ODDS: f64 = 0.03;
 
 /// What a summary says after Ctrl-C.
 pub(super) const STOPPED: &str = "The search was stopped before every effect had been tried.";
@@ -33,14 +24,14 @@ pub(super) fn rivals(
         .others
         .iter()
         .filter(|tried| tried.effect.descriptor().id != own_id)
-        .map(|tried| (tried, odds_at(tried.heldout_loss / chosen.loss_after)))
+        .map(|tried| (tried, POLICY.odds(tried.heldout_loss / chosen.loss_after)))
         .collect();
     let sum: f64 = 1.0 + odds.iter().map(|(_, odds)| odds).sum::<f64>();
-    let present = 1.0 - 0.5 * (-(improvement - EVEN_IMPROVEMENT).max(0.0) / EVEN_IMPROVEMENT).exp();
+    let present = POLICY.presence(improvement);
     let mut rivals: Vec<Rival> = Vec::new();
     for (tried, odds) in odds {
         let descriptor = tried.effect.descriptor();
-        if odds > LISTED_ODDS && rivals.iter().all(|rival| rival.id != descriptor.id) {
+        if odds > POLICY.listed_odds && rivals.iter().all(|rival| rival.id != descriptor.id) {
             let general = || experiment(&tried.effect).to_owned();
             rivals.push(Rival {
                 id: descriptor.id.to_owned(),
@@ -50,16 +41,6 @@ pub(super) fn rivals(
         }
     }
     (present / sum, rivals)
-}
-
-/// Odds of a candidate whose held-out loss is so many times that of the named effect.
-fn odds_at(loss_ratio: f64) -> f64 {
-    loss_ratio.powf(-ODDS_PER_LOSS_RATIO)
-}
-
-/// Whether a candidate whose held-out loss is so many times that of the named effect is listed as its rival.
-pub(super) fn is_listed(loss_ratio: f64) -> bool {
-    odds_at(loss_ratio) > LISTED_ODDS
 }
 
 /// What to record so that an effect shows apart from others.

@@ -165,6 +165,7 @@ fn diagnosis() -> Diagnosis {
         }),
         laws: Vec::new(),
         residual_map: residual_map(),
+        policy: crate::diagnose::policy::POLICY,
         heldout_loss: HeldOutLoss { before: 9.4, recalibrated: 6.2, after: 1.1 },
         ordinary: Vec::new(),
         search: Vec::new(),

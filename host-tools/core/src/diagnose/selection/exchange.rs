@@ -6,7 +6,7 @@
 use bowden_model::effect::ActiveEffect;
 
 use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further, remove};
-use crate::diagnose::words::is_listed;
+use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
@@ -75,7 +75,7 @@ impl Search<'_> {
         let loss_then = chosen[index].loss_after;
         let is_rival = |tried: &Tried| {
             !found.iter().any(|found| found.is_beside(&tried.effect))
-                && is_listed(tried.heldout_loss / loss_then)
+                && POLICY.is_listed(tried.heldout_loss / loss_then)
         };
         let (mut rivals, rest): (Vec<Tried>, Vec<Tried>) =
             std::mem::take(&mut chosen[index].others).into_iter().partition(is_rival);

@@ -1,28 +1,16 @@
 //! Laws that the data ask for in place of the names, or beside them: tried once no further name is found, and held to more than a
 //! name is.
 
-use super::{Chosen, Fitted, Kind, PROMISING, Round, Search, worthwhile};
+use super::{Chosen, Fitted, Kind, PROMISING, Round, Search, worth_naming, worth_stating};
 use crate::diagnose::unexplained::unexplained;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
-
-/// Share of the held-out loss that a law must remove. It is chosen among many forms with up to three coefficients each, so that
-/// more of what two realities differ by is imitated by one of them than by a name.
-const LAW_SHARE: f64 = 0.3;
-
-/// Held-out loss, in squared scales, that a law must remove whatever the share: where less than that is left no law is looked for.
-const LAW_LOSS: f64 = 0.4;
 
 /// Most laws that are found.
 const MOST_LAWS: usize = 2;
 
 /// Part of what names take off the loss that a law must promise to take off in their place, to be fitted.
 const RIVALLING: f64 = 0.5;
-
-/// Whether a law that brings the held-out loss from `before` to `after` is worth stating.
-pub(super) fn worth_stating(before: f64, after: f64) -> bool {
-    before - after > LAW_LOSS && before - after > LAW_SHARE * before
-}
 
 impl Search<'_> {
     /// Puts one law in the place of all names, or of all but the first, where it predicts clearly better than they do: by [`worth_stating`]
@@ -36,7 +24,7 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
         for kept in 0..chosen.len().min(2) {
-            let better = if chosen.len() - kept > 1 { worthwhile } else { worth_stating };
+            let better = if chosen.len() - kept > 1 { worth_naming } else { worth_stating };
             if self.progress.interrupted() || !better(present.loss, 0.0) {
                 return Ok(false);
             }
@@ -85,7 +73,7 @@ impl Search<'_> {
                 let component = fitted.newest().descriptor().component.name();
                 left.as_ref().is_some_and(|left| left.component == component)
             };
-            let worth = if fits.first().is_some_and(there) { worthwhile } else { worth_stating };
+            let worth = if fits.first().is_some_and(there) { worth_naming } else { worth_stating };
             let Some((found, with)) = self.found(&before, present, fits, worth)? else { break };
             chosen.push(found);
             *present = with;

@@ -7,9 +7,10 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::search::Starts;
 
-use super::{Chosen, Fitted, LOSS_PER_PARAMETER, Search, WORTHWHILE_LOSS, is_further};
+use super::{Chosen, Fitted, Search, is_further};
 use crate::diagnose::layout::Layout;
 use crate::diagnose::locked::{Pattern, further_pattern, too_little_travel};
+use crate::diagnose::policy::POLICY;
 use crate::fit::objective::Part;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::fit::typical::sized;
@@ -26,11 +27,6 @@ const LEFT_TO_NAMES: usize = 3;
 /// Share of the fitted loss that an instance takes off before anything is fitted anew, to be fitted with the others.
 const PROMISING_INSTANCE: f64 = 0.01;
 
-/// Whether instances that bring the held-out loss from `before` to `after` are worth having.
-fn worth_having(before: f64, after: f64) -> bool {
-    before - after > WORTHWHILE_LOSS && before - after > LOSS_PER_PARAMETER * before
-}
-
 impl Search<'_> {
     /// Adds further instances of every chosen effect that has several, where held-out data gain by them.
     pub(super) fn add_instances(
@@ -46,7 +42,7 @@ impl Search<'_> {
             let Some((layout, model, added)) = self.further_instances(present, &effect)? else { continue };
             self.progress.stage("fitting further instances", 0);
             let with = self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?;
-            if self.progress.interrupted() || !worth_having(present.loss, with.loss) {
+            if self.progress.interrupted() || !POLICY.worth_having(present.loss, with.loss) {
                 continue;
             }
             let places = with.solution.model.effects.len() - added..;
@@ -103,7 +99,7 @@ impl Search<'_> {
             let before = loss(&predictions);
             let gain = before - loss(&next_predictions);
             if too_little_travel(objective, &new)
-                || gain < WORTHWHILE_LOSS
+                || gain < POLICY.name_loss
                 || gain < PROMISING_INSTANCE * before
             {
                 break;

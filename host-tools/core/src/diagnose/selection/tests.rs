@@ -4,7 +4,7 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 use nalgebra::DMatrix;
 
-use super::{Losses, Selected, handicap, largest_ordinary, negligible, worthwhile};
+use super::{Losses, Selected, handicap, largest_ordinary, negligible, worth_naming};
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
@@ -91,16 +91,6 @@ fn a_form_that_is_not_the_usual_one_has_to_be_worth_its_choice() {
     }
 }
 
-/// A fifth of what is left is worth a name up to ten squared scales; of a hundred it takes more than 22 %.
-#[test]
-fn where_much_is_left_an_effect_has_to_take_more_off() {
-    for (before, after, named) in
-        [(10.0, 8.0, true), (12.5, 10.0, true), (125.0, 100.0, false), (145.0, 100.0, true)]
-    {
-        assert_eq!(worthwhile(before, after), named, "{before} to {after}");
-    }
-}
-
 #[test]
 fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
     for (losses, found) in [
@@ -117,6 +107,6 @@ fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
         ([1.03, 1.0, 0.67, 0.48], false),
     ] {
         let [before, with, ordinary, with_both] = losses;
-        assert_eq!(Losses { before, with, ordinary, with_both }.found(worthwhile), found, "{losses:?}");
+        assert_eq!(Losses { before, with, ordinary, with_both }.found(worth_naming), found, "{losses:?}");
     }
 }
