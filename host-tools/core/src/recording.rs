@@ -11,6 +11,7 @@ mod columns;
 mod comma_separated;
 mod file;
 mod format;
+mod frozen;
 mod mcap_file;
 mod origin;
 mod place;
@@ -214,6 +215,48 @@ impl Recording {
                 self.len(),
                 counted.join(", ")
             ));
+        }
+    }
+
+    /// Drops the rows in which the recording stood still while the bench moved on, and notes it.
+    ///
+    /// Such a stretch is of ten rows at least, in all columns, and an angle, a tension or a torque jumps at its end; see [`frozen`].
+    pub fn drop_frozen_rows(&mut self) {
+        let Some(step_s) = self.median_step_s() else { return };
+        let columns: Vec<(&[f64], bool)> = self
+            .channels()
+            .filter_map(|channel| Some((self.channel(channel)?, channel.is_mechanical())))
+            .collect();
+        let found = frozen::find(&self.t_s, step_s, &columns);
+        let Some(first) = found.first() else { return };
+        let rows: usize = found.iter().map(ExactSizeIterator::len).sum();
+        let stretches = match found.len() {
+            1 => String::new(),
+            count => format!("; {count} such stretches"),
+        };
+        let note = format!(
+            "{}: all columns stand still for {:.3} s and then jump{stretches}, {rows} of {} rows, were dropped",
+            self.place(first.start),
+            self.t_s[first.end] - self.t_s[first.start - 1],
+            self.len()
+        );
+        self.drop_rows(&found);
+        self.notes.push(note);
+    }
+
+    /// Drops rows, whose ranges rise; the others keep their time and place.
+    fn drop_rows(&mut self, ranges: &[Range<usize>]) {
+        let from = std::iter::once(0).chain(ranges.iter().map(|range| range.end));
+        let ends = ranges.iter().map(|range| range.start).chain([self.len()]);
+        let kept: Vec<usize> = from.zip(ends).flat_map(|(from, end)| from..end).collect();
+        let of = |values: &[f64]| Arc::new(kept.iter().map(|row| values[*row]).collect::<Vec<f64>>());
+        self.t_s = of(&self.t_s);
+        self.places = self.places.of(&kept);
+        for column in &mut self.columns {
+            match column {
+                Column::Known { values, .. } => *values = of(values),
+                Column::Unknown(text) => *text = text.of(&kept),
+            }
         }
     }
 

@@ -107,7 +107,8 @@ impl Rig {
         parse::parse(text, source)
     }
 
-    /// Reads a recording for a comparison with the rig: all columns, and at least [`MINIMUM_SAMPLES`].
+    /// Reads a recording for a comparison with the rig: all columns, and at least [`MINIMUM_SAMPLES`]. What is repaired or dropped stands in
+    /// its notes.
     ///
     /// # Errors
     /// See [`Recording::load`]; also fewer samples, and magnitudes that tell of another unit.
@@ -124,7 +125,9 @@ impl Rig {
                 names.join(", ")
             )));
         }
-        plausible::accept(self, recording, MINIMUM_SAMPLES)
+        let mut recording = plausible::accept(self, recording, MINIMUM_SAMPLES)?;
+        recording.drop_frozen_rows();
+        Ok(recording)
     }
 
     /// Reads what a replay needs of a recording: `t_s` and the input roles, nothing else.

@@ -19,6 +19,12 @@ const LOST_IN: f64 = 50.0;
 /// Largest error of a dirty file's clock, as a part of a step.
 const JITTER: f64 = 0.3;
 
+/// Rows of a dirty file of which some begin a stretch in which the logger repeats its last row: one in so many.
+const FROZEN_IN: usize = 8000;
+
+/// Rows of such a stretch, at least and at most.
+const FROZEN_ROWS: [f64; 2] = [50.0, 400.0];
+
 /// What was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recorded {
@@ -30,7 +36,7 @@ pub enum Recorded {
     MotorSide,
     /// Everything, at 100 Hz.
     Slow,
-    /// Everything, with spikes in the tensions, lost rows and a clock that jitters.
+    /// Everything, with spikes in the tensions, stretches in which the logger stood still, lost rows and a clock that jitters.
     Dirty,
 }
 
@@ -76,6 +82,17 @@ fn soil(recording: &mut Recording, seed: u64) {
         for value_n in tension_n {
             if unit.sample(&mut random) * SPIKE_IN < 1.0 {
                 *value_n += SPIKE_N * (2.0 * unit.sample(&mut random) - 1.0);
+            }
+        }
+    }
+    for _ in 0..recording.len() / FROZEN_IN {
+        let [shortest, longest] = FROZEN_ROWS;
+        let rows = (shortest + (longest - shortest) * unit.sample(&mut random)) as usize;
+        let first = ((recording.len() - rows) as f64 * unit.sample(&mut random)) as usize;
+        for (name, values) in columns_mut(recording) {
+            if name != "t_s" {
+                let last = values[first];
+                values[first..first + rows].fill(last);
             }
         }
     }
@@ -149,5 +166,17 @@ mod tests {
         });
         assert!((1..8).contains(&spikes.count()));
         assert_eq!(dirty, Recorded::Dirty.of(second(), 5));
+    }
+
+    /// Sixteen seconds: the logger stands still twice, for 50 to 400 rows, of which some are lost.
+    #[test]
+    fn the_logger_of_a_dirty_file_stands_still() {
+        let all = Case::new("bench", Vec::new(), 3, 0.0).train(MotionKind::Lab, 16.0).unwrap();
+        let dirty = Recorded::Dirty.of(all, 5);
+        let stands = |row: usize| {
+            [&dirty.f1_n, &dirty.f3_n, &dirty.i_motor_a].iter().all(|values| values[row] == values[row - 1])
+        };
+        let still = (1..dirty.len()).filter(|row| stands(*row)).count();
+        assert!((90..800).contains(&still), "{still} rows");
     }
 }

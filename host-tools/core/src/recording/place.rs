@@ -57,6 +57,15 @@ impl Places {
         self.unit.describe(source, number)
     }
 
+    /// The places of these samples, which rise.
+    pub(super) fn of(&self, samples: &[usize]) -> Self {
+        let mut places = Self { unit: self.unit, shifts: Vec::new() };
+        for (sample, before) in samples.iter().enumerate() {
+            places.push(sample, self.number(*before));
+        }
+        places
+    }
+
     /// The places without the first samples.
     pub(super) fn after(&self, first: usize) -> Self {
         let mut places = Self { unit: self.unit, shifts: Vec::new() };
@@ -94,5 +103,7 @@ mod tests {
         let later = places.after(1);
         assert_eq!((0..4).map(|sample| later.number(sample)).collect::<Vec<_>>(), [3, 5, 6, 7]);
         assert_eq!(later.describe("a.csv", 1), "a.csv:5");
+        let some = places.of(&[0, 3, 4]);
+        assert_eq!((0..3).map(|sample| some.number(sample)).collect::<Vec<_>>(), [2, 6, 7]);
     }
 }

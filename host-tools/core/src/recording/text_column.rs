@@ -46,6 +46,15 @@ impl TextColumn {
     }
 
     pub(super) fn slice(&self, samples: Range<usize>) -> Self {
+        self.part(samples)
+    }
+
+    /// The cells of these samples.
+    pub(super) fn of(&self, samples: &[usize]) -> Self {
+        self.part(samples.iter().copied())
+    }
+
+    fn part(&self, samples: impl Iterator<Item = usize>) -> Self {
         let mut part = Self::new(self.name.clone());
         samples.filter_map(|sample| self.cell(sample)).for_each(|cell| part.push(cell));
         part
