@@ -23,6 +23,10 @@ const FLUTTER_S: f64 = 0.5;
 /// Time at the start of each recording that is not compared, s: how it came to rest is not known.
 const LEAD_IN_S: f64 = 0.3;
 
+/// A step in time is a gap if it is longer than a block and than so many median steps: what happened in it is not known, and the
+/// [`LEAD_IN_S`] after it are not compared either.
+const GAP_IN_STEPS: f64 = 10.0;
+
 /// Length of the stretches that are held out in turn, s.
 const STRETCH_S: f64 = 1.0;
 
@@ -122,8 +126,16 @@ impl Dataset {
         let mut blocks: Vec<Block> = Vec::new();
         let mut start =
             t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
+        let gap_s =
+            recording.median_step_s().map_or(f64::INFINITY, |step_s| BLOCK_S.max(GAP_IN_STEPS * step_s));
         while start < t_s.len() {
-            let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
+            let after_gap = |sample: &usize| t_s[*sample] - t_s[*sample - 1] > gap_s;
+            let whole = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
+            if start > 0 && after_gap(&start) {
+                start = t_s.partition_point(|t| t - t_s[start] < LEAD_IN_S);
+                continue;
+            }
+            let end = (start + 1..whole).find(after_gap).unwrap_or(whole);
             let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
             let held = split && stretch % 3 == 2;
             blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });

@@ -99,3 +99,24 @@ fn a_tension_that_stood_at_zero_is_predicted_at_zero() {
     model.effects.push(offset);
     assert_eq!(seen.values, objective.residuals(&model).unwrap().values);
 }
+
+/// What the bench did in 0.4 s without a row is not known; 0.3 s later it no longer matters.
+#[test]
+fn what_follows_a_gap_is_not_compared() {
+    let whole = test_bench::swung(4000);
+    let kept: Vec<usize> = (0..1500).chain(1900..4000).collect();
+    let of = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+    let mut recording = Recording::new("gap", of(whole.t_s()));
+    for channel in whole.channels() {
+        recording.set(channel, of(whole.channel(channel).unwrap()));
+    }
+    let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+    let blocks: Vec<(usize, usize)> =
+        objective.blocks(0).iter().map(|block| (block.start, block.end)).collect();
+    // Lead-in until 0.3 s, the gap before sample 1500, samples 1500 to 1799 within 0.3 s of its end.
+    assert_eq!(blocks.first(), Some(&(300, 350)));
+    assert!(blocks.windows(2).all(|pair| pair[0].1 == pair[1].0 || pair == [(1450, 1500), (1800, 1850)]));
+    assert!(blocks.contains(&(1450, 1500)) && blocks.contains(&(1800, 1850)), "{blocks:?}");
+    assert_eq!(objective.residuals(&model).unwrap().values.len(), objective.entries().count());
+}
