@@ -302,13 +302,9 @@ impl Case<'_> {
         let stated_effects = variation.base().effects.len();
         let calibrated = Layout::of(self.model).calibrated(self.model);
         let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
-        let of_bench = |radius: &&Recalibrated| radius.bench.as_ref().is_none_or(|own| *own == bench.name);
-        let undecided = off_centre::undecided(
-            self.objective,
-            recalibrated.iter().filter(of_bench),
-            &diagnosed.effects,
-            &bench.rig.undecided,
-        );
+        let of_bench: Vec<&Recalibrated> = recalibrated.iter().filter(|one| one.is_of(&bench.name)).collect();
+        let undecided =
+            off_centre::undecided(self.objective, &of_bench, &diagnosed.effects, &bench.rig.undecided);
         BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted, undecided }
     }
 
@@ -431,10 +427,16 @@ impl Case<'_> {
         let benches = self.benches.iter();
         let now: Vec<BenchNow> =
             benches.map(|bench| self.now(bench, &last.model, &recalibrated_parameters, clock_s)).collect();
-        for undecided in now.iter().flat_map(|bench| &bench.undecided) {
-            let group = vec![undecided.parameter.clone(), format!("effects.{}", undecided.rival())];
-            if !indistinguishable.contains(&group) {
-                indistinguishable.push(group);
+        for ((bench, _), now) in self.benches.iter().zip(&now) {
+            for undecided in &now.undecided {
+                let is_it =
+                    |one: &&Recalibrated| one.parameter == undecided.parameter && one.is_of(&bench.name);
+                let name = recalibrated_parameters.iter().find(is_it).map(Recalibrated::name);
+                let name = name.unwrap_or_else(|| undecided.parameter.clone());
+                let group = vec![name, format!("effects.{}", undecided.rival())];
+                if !indistinguishable.contains(&group) {
+                    indistinguishable.push(group);
+                }
             }
         }
         let diagnosis = Diagnosis {

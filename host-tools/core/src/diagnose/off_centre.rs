@@ -5,7 +5,7 @@
 //! angles.
 
 use bowden_model::channel::Channel;
-use bowden_model::effect::ActiveEffect;
+use bowden_model::effect::{ActiveEffect, Target};
 
 use super::verdict::Recalibrated;
 use crate::fit::objective::{Objective, Series};
@@ -17,29 +17,36 @@ const RADII: [&str; 2] = ["pulleys.input_radius_m", "pulleys.output_radius_m"];
 /// Effect of an encoder that is off its centre.
 const OFF_CENTRE: &str = "encoder_eccentricity";
 
-/// Wrong radii of a bench for which a disc off its centre would stand as well, as far as the recordings tell. What was undecided
-/// before them stays so where they do not decide it.
-pub(super) fn undecided<'r>(
+/// What else would fit of a bench: wrong radii for which a disc off its centre would stand as well, as far as the recordings tell, and
+/// all of `stated` that the recordings do not settle.
+pub(super) fn undecided(
     objective: &Objective,
-    recalibrated: impl Iterator<Item = &'r Recalibrated>,
+    recalibrated: &[&Recalibrated],
     named: &[ActiveEffect],
     stated: &[Undecided],
 ) -> Vec<Undecided> {
-    if named.iter().any(|effect| effect.descriptor().id == OFF_CENTRE) {
-        return Vec::new();
-    }
-    let of_radius = |radius: &Recalibrated| {
-        let before = stated.iter().find(|undecided| undecided.parameter == radius.parameter);
-        let before = before.map_or(radius.nominal, |undecided| undecided.before);
-        let radius = Recalibrated { nominal: before, ..radius.clone() };
+    let is_named = named.iter().any(|effect| effect.descriptor().id == OFF_CENTRE);
+    let is_radius = |name: &str| RADII.contains(&name);
+    let is_fitted = |name: &str| recalibrated.iter().any(|fitted| fitted.parameter == name);
+    let is_judged = |undecided: &&Undecided| {
+        undecided.effect == OFF_CENTRE
+            && is_radius(&undecided.parameter)
+            && (is_named || is_fitted(&undecided.parameter))
+    };
+    let (judged, left): (Vec<&Undecided>, Vec<&Undecided>) = stated.iter().partition(is_judged);
+    let of_radius = |radius: &&Recalibrated| {
+        let stated = judged.iter().find(|undecided| undecided.parameter == radius.parameter);
+        let before = stated.map_or(radius.nominal, |undecided| undecided.before);
+        let radius = Recalibrated { nominal: before, ..(*radius).clone() };
         (radius.is_wrong() && cannot_be_told(objective, radius.change().abs())).then_some(Undecided {
             parameter: radius.parameter,
             before,
             effect: OFF_CENTRE,
-            channel: Some(Channel::ThetaOut),
+            target: Target::One(Channel::ThetaOut),
         })
     };
-    recalibrated.filter(|radius| RADII.contains(&radius.parameter.as_str())).filter_map(of_radius).collect()
+    let radii = recalibrated.iter().filter(|fitted| !is_named && is_radius(&fitted.parameter));
+    radii.filter_map(of_radius).chain(left.into_iter().cloned()).collect()
 }
 
 /// Whether a disc of the joint that is off by `amplitude_rad` leaves less than the angle's scale beside a straight line.
@@ -71,6 +78,8 @@ fn bend_of_a_sine(angles_rad: impl Iterator<Item = f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::effects::find;
+
     use super::*;
     use crate::joint_model::JointModel;
     use crate::test_bench;
@@ -92,13 +101,25 @@ mod tests {
             unit: "m".into(),
             at_bound: false,
         };
-        let stated = before.map(|before| Undecided {
-            parameter: radius.parameter.clone(),
-            before,
-            effect: OFF_CENTRE,
-            channel: Some(Channel::ThetaOut),
-        });
-        undecided(&objective, [&radius].into_iter(), &[], &Vec::from_iter(stated))
+        let stated = before.map(|before| of_output_radius(before, OFF_CENTRE));
+        undecided(&objective, &[&radius], &[], &Vec::from_iter(stated))
+    }
+
+    fn of_output_radius(before: f64, effect: &'static str) -> Undecided {
+        let target = Target::One(Channel::ThetaOut);
+        Undecided { parameter: "pulleys.output_radius_m".into(), before, effect, target }
+    }
+
+    /// Recordings that tell nothing of the radius, and another explanation than this one.
+    #[test]
+    fn what_recordings_do_not_touch_stays_undecided() {
+        let recording = test_bench::swung(4000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let stated = [OFF_CENTRE, "sensor_offset"].map(|effect| of_output_radius(0.015, effect));
+        assert_eq!(undecided(&objective, &[], &[], &stated), stated);
+        let found = find(OFF_CENTRE).map(ActiveEffect::with_defaults).unwrap();
+        assert_eq!(undecided(&objective, &[], &[found], &stated), stated[1..]);
     }
 
     /// 3 % of a sine leave 0.1 mrad of a straight line over ±0.5 rad and 6 mrad over ±2 rad, by the formula below.

@@ -104,6 +104,11 @@ impl Recalibrated {
         }
     }
 
+    /// Whether it is a parameter of this bench, its own or a shared one.
+    pub(super) fn is_of(&self, bench: &str) -> bool {
+        self.bench.as_deref().is_none_or(|own| own == bench)
+    }
+
     /// Relative change against the rig file.
     #[must_use]
     pub fn change(&self) -> f64 {

@@ -27,10 +27,7 @@ pub(super) fn read(file: &Section, simulation: Option<&Section>) -> Result<Vec<A
     let mut active = Vec::new();
     for (place, (id, span)) in ids.iter().enumerate() {
         let refuse = |reason: String| file.source.at(span, reason);
-        let Some(effect) = find(id) else {
-            let known = CATALOGUE.iter().map(|effect| effect.descriptor().id);
-            return Err(refuse(format!("unknown effect `{id}`; {}", advice(id, known))));
-        };
+        let effect = known(id).map_err(refuse)?;
         if ids[..place].iter().any(|(before, _)| before == id) {
             return Err(refuse(format!("effect `{id}` is listed twice; list it once")));
         }
@@ -60,6 +57,14 @@ pub(super) fn read(file: &Section, simulation: Option<&Section>) -> Result<Vec<A
         }
     }
     Ok(active)
+}
+
+/// The effect of the catalogue with this name, or what is wrong with the name.
+pub(super) fn known(id: &str) -> Result<&'static dyn Effect, String> {
+    find(id).ok_or_else(|| {
+        let known = CATALOGUE.iter().map(|effect| effect.descriptor().id);
+        format!("unknown effect `{id}`; {}", advice(id, known))
+    })
 }
 
 /// Reads `[effects.ID]`, or each entry of `[[effects.ID]]`.
@@ -117,7 +122,7 @@ fn read_entry(
 }
 
 /// Sensors on which an effect acts: one target each, all four tensions as one.
-fn targets(section: &Section, descriptor: &Descriptor) -> Result<Vec<Target>, Failure> {
+pub(super) fn targets(section: &Section, descriptor: &Descriptor) -> Result<Vec<Target>, Failure> {
     let given = match section.get(CHANNEL_KEY).map(Located::get_ref) {
         None => match descriptor.channels {
             [] => return Ok(vec![Target::None]),

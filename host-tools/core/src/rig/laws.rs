@@ -34,15 +34,13 @@ pub(super) fn read(file: &Section) -> Result<Vec<ActiveEffect>, Failure> {
 
 fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
     section.refuse_unknown("key", KEYS)?;
-    let text =
-        |key: &'static str, meaning: &str| section.string(key)?.ok_or_else(|| section.lacks(key, meaning));
-    let (port, port_span) = text("port", "where it acts")?;
+    let (port, port_span) = section.text("port", "where it acts")?;
     let at_port = || LAWS.iter().filter(move |law| law.port().name() == port);
     if at_port().next().is_none() {
         let known = LAWS.iter().map(|law| law.port().name()).collect::<std::collections::BTreeSet<_>>();
         return Err(section.source.at(&port_span, format!("unknown port `{port}`; {}", advice(port, known))));
     }
-    let (formula, span) = text("formula", "what it adds there")?;
+    let (formula, span) = section.text("formula", "what it adds there")?;
     let squeezed = |formula: &str| formula.split_whitespace().collect::<String>();
     let law = at_port().find(|law| squeezed(law.formula()) == squeezed(formula)).ok_or_else(|| {
         let known: Vec<String> = at_port().map(|law| format!("`{}`", law.formula())).collect();
@@ -50,7 +48,7 @@ fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
         section.source.at(&span, reason)
     })?;
     let descriptor = law.descriptor();
-    let (component, span) = text("component", "part of the joint")?;
+    let (component, span) = section.text("component", "part of the joint")?;
     if component != descriptor.component.name() {
         let reason =
             format!("component: got `{component}`, port {port} belongs to `{}`", descriptor.component.name());

@@ -292,9 +292,7 @@ fn read_columns(recording: &Section) -> Result<ColumnMap, Failure> {
 
 fn read_column(section: &Section) -> Result<ColumnSource, Failure> {
     section.refuse_unknown("key", ["column", "scale", "offset"])?;
-    let (column, _) = section
-        .string("column")?
-        .ok_or_else(|| section.lacks("column", "name of the column in the recordings"))?;
+    let (column, _) = section.text("column", "name of the column in the recordings")?;
     let scale = section.number("scale", FINITE)?.unwrap_or(1.0);
     if scale == 0.0 {
         let span = section.get("scale").map_or(section.span.clone(), toml::Spanned::span);

@@ -226,6 +226,14 @@ impl<'t> Section<'t> {
         self.get(key).map(|value| self.as_string(key, value)).transpose()
     }
 
+    /// A string that has to be there, and where it stands; `meaning` says what it is.
+    ///
+    /// # Errors
+    /// Place of a value that is no string, or of the section that lacks it.
+    pub fn text(&self, key: &str, meaning: &str) -> Result<LocatedStr<'t>, Failure> {
+        self.string(key)?.ok_or_else(|| self.lacks(key, meaning))
+    }
+
     /// A list of strings and where they stand.
     ///
     /// # Errors

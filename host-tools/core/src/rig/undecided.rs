@@ -11,20 +11,20 @@
 //! A simulation takes the value in the file. A board keeps its own until the table is removed: the other explanation would make it
 //! worse.
 
-use bowden_model::channel::Channel;
-use bowden_model::effects::{CATALOGUE, find};
+use bowden_model::effect::Target;
 use bowden_model::parameters::NominalParameter;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table};
 
 use super::RigParameter;
-use super::section::{Bounds, Section, advice};
+use super::effects::{self, CHANNEL_KEY};
+use super::section::{Bounds, Section};
 use crate::outcome::Failure;
 
 /// Name of the tables in a rig file.
 pub(super) const KEY: &str = "undecided";
 
 /// Keys of a table.
-const KEYS: [&str; 4] = ["parameter", "before", "effect", "channel"];
+const KEYS: [&str; 4] = ["parameter", "before", "effect", CHANNEL_KEY];
 
 /// A parameter whose change an effect would explain as well.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,16 +35,16 @@ pub struct Undecided {
     pub before: f64,
     /// Effect that would fit as well.
     pub effect: &'static str,
-    /// Channel that the effect would be on.
-    pub channel: Option<Channel>,
+    /// Sensor that the effect would be on.
+    pub target: Target,
 }
 
 impl Undecided {
     /// The effect and its channel, such as `encoder_eccentricity (theta_out_rad)`.
     #[must_use]
     pub fn rival(&self) -> String {
-        match self.channel {
-            Some(channel) => format!("{} ({})", self.effect, channel.role()),
+        match self.target.name() {
+            Some(channel) => format!("{} ({channel})", self.effect),
             None => self.effect.to_owned(),
         }
     }
@@ -57,9 +57,7 @@ pub(super) fn read(file: &Section) -> Result<Vec<Undecided>, Failure> {
 
 fn read_one(section: &Section) -> Result<Undecided, Failure> {
     section.refuse_unknown("key", KEYS)?;
-    let text =
-        |key: &'static str, meaning: &str| section.string(key)?.ok_or_else(|| section.lacks(key, meaning));
-    let (name, span) = text("parameter", "the parameter, such as pulleys.output_radius_m")?;
+    let (name, span) = section.text("parameter", "the parameter, such as pulleys.output_radius_m")?;
     let parameter = match RigParameter::parse(name) {
         Ok(RigParameter::Nominal(parameter)) => parameter,
         Ok(_) => {
@@ -72,20 +70,13 @@ fn read_one(section: &Section) -> Result<Undecided, Failure> {
     let before = section
         .number("before", bounds)?
         .ok_or_else(|| section.lacks("before", &format!("its value before the recordings, {}", spec.unit)))?;
-    let (id, span) = text("effect", "the effect that would fit as well")?;
-    let effect = find(id).ok_or_else(|| {
-        let known = CATALOGUE.iter().map(|effect| effect.descriptor().id);
-        section.source.at(&span, format!("unknown effect `{id}`; {}", advice(id, known)))
-    })?;
-    let channels = effect.descriptor().channels;
-    let channel = section.string("channel")?.map(|(role, span)| {
-        Channel::from_role(role).filter(|channel| channels.contains(channel)).ok_or_else(|| {
-            let known = advice(role, channels.iter().map(|channel| channel.role()));
-            section.source.at(&span, format!("effect `{id}` has no channel `{role}`; {known}"))
-        })
-    });
-    let channel = channel.transpose()?;
-    Ok(Undecided { parameter: name.to_owned(), before, effect: effect.descriptor().id, channel })
+    let (id, span) = section.text("effect", "the effect that would fit as well")?;
+    let effect = effects::known(id).map_err(|reason| section.source.at(&span, reason))?;
+    let descriptor = effect.descriptor();
+    let [target] = effects::targets(section, descriptor)?[..] else {
+        return Err(section.source.at(&section.span, "names several channels; write one table for each"));
+    };
+    Ok(Undecided { parameter: name.to_owned(), before, effect: descriptor.id, target })
 }
 
 /// Replaces all tables of a document.
@@ -100,8 +91,8 @@ pub(super) fn replace(document: &mut DocumentMut, all: &[Undecided]) {
         table.insert("parameter", toml_edit::value(&undecided.parameter));
         table.insert("before", toml_edit::value(undecided.before));
         table.insert("effect", toml_edit::value(undecided.effect));
-        if let Some(channel) = undecided.channel {
-            table.insert("channel", toml_edit::value(channel.role()));
+        if let Some(channel) = undecided.target.name() {
+            table.insert(CHANNEL_KEY, toml_edit::value(channel));
         }
         tables.push(table);
     }
@@ -142,6 +133,7 @@ mod tests {
             ("encoder_ecc", "encoder_exc", "did you mean `encoder_eccentricity`?"),
             ("theta_out_rad", "f1_n", "has no channel `f1_n`"),
             ("before = 0.015\n", "", "before"),
+            ("\"theta_out_rad\"", "[\"theta_in_rad\", \"theta_out_rad\"]", "several channels"),
         ] {
             let text = format!("{RIG}{}", TABLE.replace(right, wrong));
             let message = Rig::parse(&text, "rig.toml").unwrap_err().to_string();
