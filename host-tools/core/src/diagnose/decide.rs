@@ -36,8 +36,8 @@ pub fn decide(evidence: &Evidence, policy: &Policy) -> Verdict {
 
 #[cfg(test)]
 mod tests {
-    use super::super::policy::POLICY;
     use super::*;
+    use crate::diagnose::policy::POLICY;
 
     #[test]
     fn names_come_before_structure_and_structure_before_parameters() {
@@ -61,10 +61,8 @@ mod tests {
             assert_eq!(decide(&evidence, &POLICY), verdict, "{evidence:?}");
         }
         // By another policy it is worth correcting.
-        let lenient = crate::diagnose::policy::Policy { name_share: 0.01, name_loss: 0.01, ..POLICY };
-        assert_eq!(
-            decide(&Evidence { loss_recalibrated: 1.95, ..explained }, &lenient),
-            Verdict::Recalibrate
-        );
+        let lenient = Policy { name_share: 0.01, name_loss: 0.01, ..POLICY };
+        let hardly_better = Evidence { loss_recalibrated: 1.95, ..explained };
+        assert_eq!(decide(&hardly_better, &lenient), Verdict::Recalibrate);
     }
 }

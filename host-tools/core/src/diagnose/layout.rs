@@ -27,14 +27,14 @@ const EXHAUSTED: f64 = 0.99;
 static ORDINARY: LazyLock<Vec<&'static dyn Effect>> =
     LazyLock::new(|| CATALOGUE.into_iter().rev().filter(|effect| effect.ordinary().is_some()).collect());
 
-/// How much of an effect every bench like `model` has, in the effect's unit; `None` where the model cannot have it.
-fn ordinary_in(model: &JointModel, effect: &dyn Effect) -> Option<Ordinary> {
+/// Usual and largest strength that every bench like `model` has of an effect, in the effect's unit; `None` where the model cannot have it.
+fn ordinary_in(model: &JointModel, effect: &dyn Effect) -> Option<[f64; 2]> {
     let Ordinary { unit, usual, largest } = effect.ordinary()?;
     let one = match unit {
         OrdinaryUnit::OfSheath => model.parameters.tendon.and(model.parameters.sheath).map(|_| 1.0),
         OrdinaryUnit::StallTorque => model.parameters.motor.as_ref().map(pulley_stall_torque_nm),
     }?;
-    Some(Ordinary { unit, usual: usual * one, largest: largest * one })
+    Some([usual * one, largest * one])
 }
 
 /// Whether something ordinary has a place beside what was found.
@@ -44,7 +44,7 @@ fn stands_beside(effect: &dyn Effect, found: &[ActiveEffect]) -> bool {
 
 /// Largest strength of an effect that is not worth a name; `None` for one that no bench has of itself.
 pub(super) fn largest_ordinary(believed: &JointModel, effect: &dyn Effect) -> Option<f64> {
-    ordinary_in(believed, effect).map(|ordinary| ordinary.largest)
+    ordinary_in(believed, effect).map(|[_, largest]| largest)
 }
 
 /// Order of the effects of a searched model.
@@ -70,7 +70,7 @@ impl Layout {
             if is_stated || self.ordinary.contains(&place) || !stands_beside(*effect, found) {
                 continue;
             }
-            if let Some(Ordinary { usual, .. }) = ordinary_in(model, *effect) {
+            if let Some([usual, _]) = ordinary_in(model, *effect) {
                 let mut effect = ActiveEffect::with_defaults(*effect);
                 effect.parameters[0] = usual;
                 let index = layout.ordinary.partition_point(|other| *other < place);
@@ -150,7 +150,7 @@ impl Layout {
         let mut free = recalibrated_from(believed, model);
         free.extend(self.stated(model));
         for (index, place) in self.ordinary.iter().enumerate() {
-            if let (Some(Ordinary { usual, largest, .. }), Some(parameter)) =
+            if let (Some([usual, largest]), Some(parameter)) =
                 (ordinary_in(believed, ORDINARY[*place]), Free::effect(model, self.own + index, 0))
             {
                 free.push(parameter.as_ratio().up_to(largest).believed_within(usual, SPREAD));

@@ -99,10 +99,10 @@ impl Policy {
         loss_ratio.powf(-self.odds_per_loss_ratio)
     }
 
-    /// Whether a candidate whose held-out loss is so many times that of the named effect is listed as its rival.
+    /// Whether a candidate with these odds is listed as a rival of the named effect.
     #[must_use]
-    pub fn is_listed(&self, loss_ratio: f64) -> bool {
-        self.odds(loss_ratio) > self.listed_odds
+    pub fn is_listed(&self, odds: f64) -> bool {
+        odds > self.listed_odds
     }
 
     /// Probability that anything is there at all which improves held-out data by so much.
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn a_rival_that_leaves_two_fifths_more_is_no_longer_listed() {
         assert!((POLICY.odds(1.2) - 0.1615).abs() < 1e-4);
-        assert!(POLICY.is_listed(1.41) && !POLICY.is_listed(1.43));
+        assert!(POLICY.is_listed(POLICY.odds(1.41)) && !POLICY.is_listed(POLICY.odds(1.43)));
         assert_eq!(POLICY.presence(0.1), 0.5);
         assert!(POLICY.presence(0.9) > 0.999);
     }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
-use super::policy::POLICY;
+use super::policy::{POLICY, Policy};
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::typical::typical;
@@ -192,15 +192,7 @@ struct Losses {
 }
 
 /// Whether what brings the held-out loss from one value to another is worth it.
-type Worth = fn(f64, f64) -> bool;
-
-fn worth_naming(before: f64, after: f64) -> bool {
-    POLICY.worth_naming(before, after)
-}
-
-fn worth_stating(before: f64, after: f64) -> bool {
-    POLICY.worth_stating(before, after)
-}
+type Worth = fn(&Policy, f64, f64) -> bool;
 
 /// What a round tries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -215,7 +207,8 @@ impl Losses {
     /// Whether the candidate is found: it is worth it, and either does better than the ordinary in its place or is worth it
     /// beside that.
     fn found(self, worth: Worth) -> bool {
-        worth(self.before, self.with) && (self.replaces_ordinary() || worth(self.ordinary, self.with_both))
+        worth(&POLICY, self.before, self.with)
+            && (self.replaces_ordinary() || worth(&POLICY, self.ordinary, self.with_both))
     }
 
     fn replaces_ordinary(self) -> bool {
@@ -296,7 +289,9 @@ impl Search<'_> {
             let before = self.without_exhausted(present)?;
             let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
-            let Some((found, with)) = self.found(&before, present, fits, worth_naming)? else { break };
+            let Some((found, with)) = self.found(&before, present, fits, Policy::worth_naming)? else {
+                break;
+            };
             chosen.push(found);
             *present = with;
             self.add_instances(present, chosen)?;
@@ -336,7 +331,7 @@ impl Search<'_> {
     ) -> Result<Option<(Chosen, Fitted)>, Failure> {
         let finalists = if before.layout == present.layout { 1 } else { FINALISTS };
         let finalists = &fits[..finalists.min(fits.len())];
-        if !finalists.iter().any(|fitted| worth(before.loss, fitted.loss)) {
+        if !finalists.iter().any(|fitted| worth(&POLICY, before.loss, fitted.loss)) {
             return Ok(None);
         }
         let mut beside: Vec<Fitted> = finalists
@@ -388,7 +383,7 @@ impl Search<'_> {
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             let bare_loss = self.without_exhausted(&rest)?.loss;
             self.progress.advance(1);
-            if worth_naming(bare_loss, present.loss) {
+            if POLICY.worth_naming(bare_loss, present.loss) {
                 chosen[index].stands(bare_loss, present.loss);
                 index += 1;
             } else {

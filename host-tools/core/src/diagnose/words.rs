@@ -31,7 +31,7 @@ pub(super) fn rivals(
     let mut rivals: Vec<Rival> = Vec::new();
     for (tried, odds) in odds {
         let descriptor = tried.effect.descriptor();
-        if odds > POLICY.listed_odds && rivals.iter().all(|rival| rival.id != descriptor.id) {
+        if POLICY.is_listed(odds) && rivals.iter().all(|rival| rival.id != descriptor.id) {
             let general = || experiment(&tried.effect).to_owned();
             rivals.push(Rival {
                 id: descriptor.id.to_owned(),

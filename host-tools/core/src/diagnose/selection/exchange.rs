@@ -75,7 +75,7 @@ impl Search<'_> {
         let loss_then = chosen[index].loss_after;
         let is_rival = |tried: &Tried| {
             !found.iter().any(|found| found.is_beside(&tried.effect))
-                && POLICY.is_listed(tried.heldout_loss / loss_then)
+                && POLICY.is_listed(POLICY.odds(tried.heldout_loss / loss_then))
         };
         let (mut rivals, rest): (Vec<Tried>, Vec<Tried>) =
             std::mem::take(&mut chosen[index].others).into_iter().partition(is_rival);

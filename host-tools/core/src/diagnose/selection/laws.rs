@@ -1,7 +1,8 @@
 //! Laws that the data ask for in place of the names, or beside them: tried once no further name is found, and held to more than a
 //! name is.
 
-use super::{Chosen, Fitted, Kind, PROMISING, Round, Search, worth_naming, worth_stating};
+use super::{Chosen, Fitted, Kind, PROMISING, Round, Search, Worth};
+use crate::diagnose::policy::{POLICY, Policy};
 use crate::diagnose::unexplained::unexplained;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -13,7 +14,7 @@ const MOST_LAWS: usize = 2;
 const RIVALLING: f64 = 0.5;
 
 impl Search<'_> {
-    /// Puts one law in the place of all names, or of all but the first, where it predicts clearly better than they do: by [`worth_stating`]
+    /// Puts one law in the place of all names, or of all but the first, where it predicts clearly better than they do: by [`Policy::worth_stating`]
     /// what one name does, and what several do by as much as a name must be worth. `nothing` is the fit without either. Says whether it
     /// did.
     pub(super) fn law_in_place_of_names(
@@ -24,8 +25,9 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
         for kept in 0..chosen.len().min(2) {
-            let better = if chosen.len() - kept > 1 { worth_naming } else { worth_stating };
-            if self.progress.interrupted() || !better(present.loss, 0.0) {
+            let better: Worth =
+                if chosen.len() - kept > 1 { Policy::worth_naming } else { Policy::worth_stating };
+            if self.progress.interrupted() || !better(&POLICY, present.loss, 0.0) {
                 return Ok(false);
             }
             let beside = match chosen.first().filter(|_| kept == 1) {
@@ -40,8 +42,8 @@ impl Search<'_> {
             let (record, fits) =
                 self.one_more(&before, Kind::Law, (RIVALLING * removed_share).max(PROMISING))?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
-            if let Some((found, with)) = self.found(&before, &beside, fits, worth_stating)?
-                && better(present.loss, with.loss)
+            if let Some((found, with)) = self.found(&before, &beside, fits, Policy::worth_stating)?
+                && better(&POLICY, present.loss, with.loss)
             {
                 chosen.truncate(kept);
                 chosen.push(found);
@@ -61,7 +63,7 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
     ) -> Result<(), Failure> {
         for _ in 0..MOST_LAWS {
-            if self.progress.interrupted() || !worth_stating(present.loss, 0.0) {
+            if self.progress.interrupted() || !POLICY.worth_stating(present.loss, 0.0) {
                 break;
             }
             // Where a free form has shown that something is left, and where, a law of that part need be worth no more than a name.
@@ -73,7 +75,8 @@ impl Search<'_> {
                 let component = fitted.newest().descriptor().component.name();
                 left.as_ref().is_some_and(|left| left.component == component)
             };
-            let worth = if fits.first().is_some_and(there) { worth_naming } else { worth_stating };
+            let worth: Worth =
+                if fits.first().is_some_and(there) { Policy::worth_naming } else { Policy::worth_stating };
             let Some((found, with)) = self.found(&before, present, fits, worth)? else { break };
             chosen.push(found);
             *present = with;

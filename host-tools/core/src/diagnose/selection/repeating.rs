@@ -71,6 +71,7 @@ impl Search<'_> {
             |predictions: &[Prediction]| objective.mean_loss(&objective.compare(predictions), Part::Training);
         let (mut layout, mut model) = (present.layout.clone(), present.solution.model.clone());
         let mut predictions = objective.predict(&model)?;
+        let mut present_loss = loss(&predictions);
         let mut added = 0;
         loop {
             let found = layout.first_found()..;
@@ -96,15 +97,16 @@ impl Search<'_> {
             let others = next.effects[found].iter_mut().filter(|other| other.is_beside(effect));
             others.zip(beside).for_each(|(other, beside)| *other = beside);
             let next_predictions = objective.predict(&next)?;
-            let before = loss(&predictions);
-            let gain = before - loss(&next_predictions);
+            let next_loss = loss(&next_predictions);
+            let gain = present_loss - next_loss;
             if too_little_travel(objective, &new)
                 || gain < POLICY.name_loss
-                || gain < PROMISING_INSTANCE * before
+                || gain < PROMISING_INSTANCE * present_loss
             {
                 break;
             }
-            (layout, model, predictions) = (next_layout, next, next_predictions);
+            (layout, model) = (next_layout, next);
+            (predictions, present_loss) = (next_predictions, next_loss);
             added += 1;
         }
         Ok((added > 0).then_some((layout, model, added)))

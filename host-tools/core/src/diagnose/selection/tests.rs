@@ -4,7 +4,8 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 use nalgebra::DMatrix;
 
-use super::{Losses, Selected, handicap, largest_ordinary, negligible, worth_naming};
+use super::{Losses, Selected, handicap, largest_ordinary, negligible};
+use crate::diagnose::policy::Policy;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
@@ -107,6 +108,10 @@ fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
         ([1.03, 1.0, 0.67, 0.48], false),
     ] {
         let [before, with, ordinary, with_both] = losses;
-        assert_eq!(Losses { before, with, ordinary, with_both }.found(worth_naming), found, "{losses:?}");
+        assert_eq!(
+            Losses { before, with, ordinary, with_both }.found(Policy::worth_naming),
+            found,
+            "{losses:?}"
+        );
     }
 }
