@@ -268,6 +268,12 @@ fn what_a_cut_or_gappy_recording_still_holds_is_used_and_said() {
     let again = |line: usize| good.lines().nth(line - 1).expect("a line of the file");
     let repeated = with_line(30, &format!("{}\n{}\n{}", again(30), again(30), again(30)));
     let spiked = with_line(30, "0.028,0.0028,-44.5,x");
+    // The logger writes sample 19 again in the twelve rows after it, under new times.
+    let mut frozen: Vec<String> = good.lines().map(str::to_owned).collect();
+    for (sample, line) in frozen[1..].iter_mut().enumerate().take(32).skip(20) {
+        *line = format!("{:.3},{},again", sample as f64 * 1e-3, "0.0019,30.02");
+    }
+    let frozen = frozen.join("\n") + "\n";
     let cases: Vec<(&str, &[u8], &str)> = vec![
         ("rec.csv", &repeated, "rec.csv:31: the row before it stands here again; 2 such rows were dropped"),
         (
@@ -275,6 +281,11 @@ fn what_a_cut_or_gappy_recording_still_holds_is_used_and_said() {
             &spiked,
             "rec.csv:30: f1_n is -44.5 between 30.03 and 30.03; one value of 60 samples stood out as spikes and were set aside \
              (f1_n 1)",
+        ),
+        (
+            "rec.csv",
+            frozen.as_bytes(),
+            "rec.csv:22: all columns stand still for 0.013 s and then jump, 12 of 60 rows, were dropped",
         ),
         ("rec.csv", cut_line, "rec.csv:61: the file ends within this line; the line was dropped"),
         ("rec.csv", bad_last, "rec.csv:61: the file ends within this line; the line was dropped"),

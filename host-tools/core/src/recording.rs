@@ -35,6 +35,9 @@ pub use row::{Cell, RowColumn};
 pub use row_writer::RowWriter;
 pub use text_column::TextColumn;
 
+/// A step in time longer than so many median steps is a gap: samples were lost.
+const GAP_IN_STEPS: f64 = 10.0;
+
 /// Buffer between file and parser, bytes.
 const READ_BUFFER: usize = 1 << 18;
 
@@ -169,6 +172,11 @@ impl Recording {
         Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
 
+    /// Time from which on a step between samples is a gap, s; `None` for fewer than two samples.
+    pub fn gap_s(&self) -> Option<f64> {
+        self.median_step_s().map(|step_s| GAP_IN_STEPS * step_s)
+    }
+
     /// What was lost or repaired when the recording was read, one line each.
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -255,7 +263,7 @@ impl Recording {
         for column in &mut self.columns {
             match column {
                 Column::Known { values, .. } => *values = of(values),
-                Column::Unknown(text) => *text = text.of(&kept),
+                Column::Unknown(text) => *text = text.of(kept.iter().copied()),
             }
         }
     }
@@ -292,7 +300,7 @@ impl Recording {
             Column::Known { channel, values } => {
                 Column::Known { channel: *channel, values: Arc::new(values[samples.clone()].to_vec()) }
             }
-            Column::Unknown(text) => Column::Unknown(text.slice(samples.clone())),
+            Column::Unknown(text) => Column::Unknown(text.of(samples.clone())),
         });
         Self {
             source: self.source.clone(),

@@ -126,6 +126,7 @@ impl Rig {
             )));
         }
         let mut recording = plausible::accept(self, recording, MINIMUM_SAMPLES)?;
+        // Not for a replay, which answers every row that was recorded.
         recording.drop_frozen_rows();
         Ok(recording)
     }

@@ -48,20 +48,27 @@ pub(super) fn stated(
         law.form().behaviour(),
         law.variable().name(),
         100.0 * heldout_improvement,
-        if is_loose(&found, descriptor.parameters[0].name) { LOOSE } else { "" }
+        looseness(&found, descriptor.parameters[0].name)
     );
     found
 }
 
-/// What is to be known of a law with a coefficient that the data hardly tell.
-const LOOSE: &str = " Its strength is not known to a half, or a coefficient stands at the end of what is tried: coefficients make up for \
-                     each other, and only the curve is known, within the angles, speeds and tensions that were recorded.";
-
-/// Whether the strength is not known to a half of its value, or a coefficient is at the end of its range. A phase and a place may lie at
-/// zero.
-fn is_loose(law: &FoundLaw, strength: &str) -> bool {
+/// What is to be known of a law with coefficients that the data hardly tell: a strength that is not known to a half, and any at the end
+/// of its range. A phase and a place may lie at zero, however well they are known.
+fn looseness(law: &FoundLaw, strength: &str) -> String {
     let is_unknown = |c: &Estimate| c.std.is_some_and(|std| std > 0.5 * c.value.abs());
-    law.coefficients.values().any(|c| c.at_bound) || law.coefficients.get(strength).is_some_and(is_unknown)
+    let weak = law.coefficients.get(strength).filter(|c| is_unknown(c));
+    let weak = weak.map(|_| format!("{strength} is not known to a half"));
+    let at_bound = law.coefficients.iter().filter(|(_, c)| c.at_bound);
+    let at_bound = at_bound.map(|(name, _)| format!("{name} stands at the end of what is tried"));
+    let reasons: Vec<String> = weak.into_iter().chain(at_bound).collect();
+    if reasons.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Only the curve is known, within the angles, speeds and tensions that were recorded: {}.",
+        reasons.join(", and ")
+    )
 }
 
 /// Port, formula and coefficients in one line.
@@ -128,11 +135,11 @@ mod tests {
     #[test]
     fn a_coefficient_that_the_data_hardly_tell_is_said_to_be_one() {
         let known = sentence(2.0, 0.1);
-        assert!(!known.contains("only the curve") && known.contains(" ± 0.200"), "{known}");
+        assert!(!known.contains("Only the curve") && known.contains(" ± 0.200"), "{known}");
         let loose = sentence(2.0, 0.7);
-        assert!(loose.ends_with(LOOSE), "{loose}");
+        assert!(loose.ends_with(": amplitude_nm is not known to a half."), "{loose}");
         let at_the_end = sentence(5.0, 0.1);
         assert!(at_the_end.contains("exponent = 5.00 (the end of what is tried)"), "{at_the_end}");
-        assert!(at_the_end.ends_with(LOOSE));
+        assert!(at_the_end.ends_with(": exponent stands at the end of what is tried."), "{at_the_end}");
     }
 }

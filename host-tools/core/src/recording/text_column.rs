@@ -1,7 +1,5 @@
 //! Columns that are kept and not interpreted.
 
-use std::ops::Range;
-
 /// A column of text, one run of bytes for all cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextColumn {
@@ -45,16 +43,8 @@ impl TextColumn {
         self.text.truncate(self.ends.last().copied().unwrap_or(0));
     }
 
-    pub(super) fn slice(&self, samples: Range<usize>) -> Self {
-        self.part(samples)
-    }
-
     /// The cells of these samples.
-    pub(super) fn of(&self, samples: &[usize]) -> Self {
-        self.part(samples.iter().copied())
-    }
-
-    fn part(&self, samples: impl Iterator<Item = usize>) -> Self {
+    pub(super) fn of(&self, samples: impl Iterator<Item = usize>) -> Self {
         let mut part = Self::new(self.name.clone());
         samples.filter_map(|sample| self.cell(sample)).for_each(|cell| part.push(cell));
         part

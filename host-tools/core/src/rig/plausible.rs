@@ -12,9 +12,6 @@ pub const MINIMUM_SAMPLES: usize = 50;
 /// Longest median step that can resolve the motion of a joint, s.
 const LONGEST_STEP_S: f64 = 0.5;
 
-/// A step longer than so many median steps counts as a gap.
-const GAP_IN_STEPS: f64 = 10.0;
-
 /// Largest angle of a joint with tendons, rad: two turns.
 const LARGEST_TENDON_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
 
@@ -76,7 +73,8 @@ pub(super) fn accept(rig: &Rig, mut recording: Recording, samples: usize) -> Res
 /// A note on steps in time that are far longer than the others.
 fn find_gaps(recording: &Recording, step_s: f64) -> Option<String> {
     let t_s = recording.t_s();
-    let long = |pair: &[f64]| pair[1] - pair[0] > GAP_IN_STEPS * step_s;
+    let gap_s = recording.gap_s()?;
+    let long = |pair: &[f64]| pair[1] - pair[0] > gap_s;
     let first = t_s.windows(2).position(long)?;
     let gaps = t_s.windows(2).filter(|pair| long(pair)).count();
     let length_s = t_s[first + 1] - t_s[first];

@@ -20,12 +20,8 @@ const BLOCK_S: f64 = 0.05;
 /// Length of a block of flutter, s.
 const FLUTTER_S: f64 = 0.5;
 
-/// Time at the start of each recording that is not compared, s: how it came to rest is not known.
+/// Time at the start of each recording, and after a gap in it, that is not compared, s: how it came there is not known.
 const LEAD_IN_S: f64 = 0.3;
-
-/// A step in time is a gap if it is longer than a block and than so many median steps: what happened in it is not known, and the
-/// [`LEAD_IN_S`] after it are not compared either.
-const GAP_IN_STEPS: f64 = 10.0;
 
 /// Length of the stretches that are held out in turn, s.
 const STRETCH_S: f64 = 1.0;
@@ -126,16 +122,15 @@ impl Dataset {
         let mut blocks: Vec<Block> = Vec::new();
         let mut start =
             t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
-        let gap_s =
-            recording.median_step_s().map_or(f64::INFINITY, |step_s| BLOCK_S.max(GAP_IN_STEPS * step_s));
+        // What happened in a gap is not known, as at the start; within a block it is as good as none.
+        let gap_s = recording.gap_s().map_or(f64::INFINITY, |gap_s| gap_s.max(BLOCK_S));
+        let follows_gap = |sample: usize| sample > 0 && t_s[sample] - t_s[sample - 1] > gap_s;
         while start < t_s.len() {
-            let after_gap = |sample: &usize| t_s[*sample] - t_s[*sample - 1] > gap_s;
-            let whole = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
-            if start > 0 && after_gap(&start) {
+            if follows_gap(start) {
                 start = t_s.partition_point(|t| t - t_s[start] < LEAD_IN_S);
                 continue;
             }
-            let end = (start + 1..whole).find(after_gap).unwrap_or(whole);
+            let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
             let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
             let held = split && stretch % 3 == 2;
             blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });
