@@ -57,10 +57,12 @@ fn repeated(rows: usize, columns: &[(&[f64], bool)]) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
     use rand_distr::{Distribution, Normal};
     use rand_pcg::Pcg64;
 
     use super::*;
+    use crate::recording::{Column, Recording, TextColumn};
 
     const STEP_S: f64 = 1e-3;
 
@@ -105,22 +107,45 @@ mod tests {
         }
     }
 
-    /// To and fro with a second of rest at each end.
+    /// To and fro with 0.3 s of rest at each end, so short that they are not taken for how the recording is.
     #[test]
     fn a_bench_at_rest_is_not_frozen() {
-        let rests = |t_s: f64| {
-            let phase = t_s % 4.0;
-            let swept = |from_s: f64| 0.5 * (1.0 - (std::f64::consts::PI * (phase - from_s)).cos());
-            match phase {
-                0.0..1.0 => swept(0.0),
-                1.0..2.0 => 1.0,
-                2.0..3.0 => 1.0 - swept(2.0),
-                _ => 0.0,
-            }
+        let swept = |t_s: f64| 0.5 * (1.0 - (std::f64::consts::PI * t_s / 1.7).cos());
+        let rests = |t_s: f64| match t_s % 4.0 {
+            phase_s @ 0.0..1.7 => swept(phase_s),
+            1.7..2.0 => 1.0,
+            phase_s @ 2.0..3.7 => 1.0 - swept(phase_s - 2.0),
+            _ => 0.0,
         };
         for noise_n in [0.1, 0.0] {
             assert_eq!(found(&rests, noise_n, &|_| {}), [], "noise {noise_n} N");
         }
+    }
+
+    #[test]
+    fn what_is_not_frozen_is_kept_in_all_columns_with_its_place() {
+        let t_s: Vec<f64> = (0..400).map(|k| f64::from(k) * STEP_S).collect();
+        let mut values = [swing, |t_s| 20.0 + swing(t_s)].map(|of| t_s.iter().map(|t_s| of(*t_s)).collect());
+        freeze(&mut values, 100..150);
+        let [theta_rad, f1_n] = values;
+        let mut recording = Recording::new("run", t_s.clone())
+            .with(Channel::ThetaIn, theta_rad.clone())
+            .with(Channel::F1, f1_n.clone());
+        let mut remarks = TextColumn::new("remark");
+        (0..400).for_each(|row| remarks.push(&row.to_string()));
+        recording.columns.push(Column::Unknown(remarks));
+
+        recording.drop_frozen_rows();
+        let kept: Vec<usize> = (0..101).chain(150..400).collect();
+        let of = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+        assert_eq!(recording.t_s(), of(&t_s));
+        assert_eq!(recording.channel(Channel::ThetaIn).unwrap(), of(&theta_rad));
+        assert_eq!(recording.channel(Channel::F1).unwrap(), of(&f1_n));
+        let Some(Column::Unknown(remarks)) = recording.columns().last() else { panic!("no remarks") };
+        assert!(remarks.cells().eq(kept.iter().map(usize::to_string)));
+        assert_eq!(recording.place(101), "run: sample 150");
+        let note = "run: sample 101: all columns stand still for 0.050 s and then jump, 49 of 400 rows, were dropped";
+        assert_eq!(recording.notes(), [note]);
     }
 
     /// One column alone may stand still, a few rows may repeat, and a recording of a source that is slower than its rows repeats them all.

@@ -116,7 +116,7 @@ fn what_follows_a_gap_is_not_compared() {
         objective.blocks(0).iter().map(|block| (block.start, block.end)).collect();
     // Lead-in until 0.3 s, the gap before sample 1500, samples 1500 to 1799 within 0.3 s of its end.
     assert_eq!(blocks.first(), Some(&(300, 350)));
-    assert!(blocks.windows(2).all(|pair| pair[0].1 == pair[1].0 || pair == [(1450, 1500), (1800, 1850)]));
-    assert!(blocks.contains(&(1450, 1500)) && blocks.contains(&(1800, 1850)), "{blocks:?}");
+    let holes = blocks.windows(2).filter(|pair| pair[0].1 != pair[1].0);
+    assert_eq!(holes.collect::<Vec<_>>(), [[(1450, 1500), (1800, 1850)]]);
     assert_eq!(objective.residuals(&model).unwrap().values.len(), objective.entries().count());
 }
