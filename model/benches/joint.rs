@@ -7,7 +7,9 @@
 use std::f64::consts::{PI, TAU};
 
 use bowden_model::drive::BridgeInput;
+use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
+use bowden_model::effects::find;
 use bowden_model::friction_law::FrictionLaw;
 use bowden_model::parameters::{
     JointParameters, LoadParameters, MotorParameters, PulleyParameters, SensorParameters, SheathParameters,
@@ -25,7 +27,7 @@ fn main() {
     divan::main();
 }
 
-fn joint(elements: usize, friction: FrictionLaw) -> PlantConfig {
+fn joint(elements: usize, friction: FrictionLaw, effects: &[&str]) -> PlantConfig {
     let parameters = JointParameters {
         motor: Some(MotorParameters {
             supply_v: 24.0,
@@ -48,7 +50,9 @@ fn joint(elements: usize, friction: FrictionLaw) -> PlantConfig {
         sensors: SensorParameters::default(),
         friction,
     };
-    let effects = EffectSet::EMPTY;
+    let typical = |id: &&str| ActiveEffect::with_defaults(find(id).expect("an effect of the catalogue"));
+    let effects = effects.iter().map(typical).collect::<Vec<_>>();
+    let effects = EffectSet::from_slice(&effects).expect("few effects");
     PlantConfig::new(parameters, elements, effects, InputBoundary::Motor, OutputBoundary::Arm)
         .expect("a complete bench")
 }
@@ -89,7 +93,7 @@ fn steps() -> usize {
 
 #[divan::bench(args = [1, 4, 16, 32, 64])]
 fn distributed(bencher: divan::Bencher, elements: usize) {
-    let config = joint(elements, FrictionLaw::Distributed);
+    let config = joint(elements, FrictionLaw::Distributed, &[]);
     bencher.counter(ItemsCount::new(steps())).bench(|| {
         let plant = run(&config);
         assert!(plant.theta_out_rad().is_finite());
@@ -99,6 +103,13 @@ fn distributed(bencher: divan::Bencher, elements: usize) {
 
 #[divan::bench]
 fn lumped(bencher: divan::Bencher) {
-    let config = joint(1, FrictionLaw::Lumped);
+    let config = joint(1, FrictionLaw::Lumped, &[]);
+    bencher.counter(ItemsCount::new(steps())).bench(|| run(&config));
+}
+
+/// What a search simulates: four contacts, with what every bench has and with friction that changes at every step.
+#[divan::bench(args = [&["presliding_compliance"] as &[&str], &["presliding_compliance", "sheath_stribeck_friction"]])]
+fn searched(bencher: divan::Bencher, effects: &[&str]) {
+    let config = joint(4, FrictionLaw::Distributed, effects);
     bencher.counter(ItemsCount::new(steps())).bench(|| run(&config));
 }

@@ -30,6 +30,8 @@ pub struct EffectSet {
     /// Component of each: every step asks for it many times, and its descriptor is behind a call.
     components: [Option<Component>; MAX_ACTIVE],
     count: usize,
+    /// Whether there is any of each component.
+    touched: [bool; Component::ALL.len()],
 }
 
 /// State of every effect of an [`EffectSet`], in its order.
@@ -40,7 +42,12 @@ pub const FRESH_STATES: EffectStates = [[0.0; MAX_STATE]; MAX_ACTIVE];
 
 impl EffectSet {
     /// No effects.
-    pub const EMPTY: Self = Self { active: [None; MAX_ACTIVE], components: [None; MAX_ACTIVE], count: 0 };
+    pub const EMPTY: Self = Self {
+        active: [None; MAX_ACTIVE],
+        components: [None; MAX_ACTIVE],
+        count: 0,
+        touched: [false; Component::ALL.len()],
+    };
 
     /// Adds an effect.
     ///
@@ -49,7 +56,9 @@ impl EffectSet {
     pub fn push(&mut self, effect: ActiveEffect) -> Result<(), TooManyEffects> {
         let slot = self.active.get_mut(self.count).ok_or(TooManyEffects)?;
         *slot = Some(effect);
-        self.components[self.count] = Some(effect.descriptor().component);
+        let component = effect.descriptor().component;
+        self.components[self.count] = Some(component);
+        self.touched[component as usize] = true;
         self.count += 1;
         Ok(())
     }
@@ -73,8 +82,8 @@ impl EffectSet {
 
     /// Whether any effect belongs to `component`.
     #[must_use]
-    pub fn touches(&self, component: Component) -> bool {
-        self.components[..self.count].contains(&Some(component))
+    pub const fn touches(&self, component: Component) -> bool {
+        self.touched[component as usize]
     }
 
     /// Law of sheath friction with these effects, for a rig that says `nominal`; the last effect that has one decides.
@@ -95,6 +104,9 @@ impl EffectSet {
         states: &mut EffectStates,
         mut hook: impl FnMut(&'static dyn Effect, &ActiveEffect, &[f64; MAX_PARAMETERS], &mut EffectState),
     ) {
+        if !self.touches(component) {
+            return;
+        }
         for (index, state) in states.iter_mut().enumerate().take(self.count) {
             if self.components[index] == Some(component)
                 && let Some(active) = &self.active[index]

@@ -202,31 +202,44 @@ impl SlipLimits {
 
     /// Replaces the limits; costs nothing when nothing changed.
     pub fn set(&mut self, mesh: &TendonMesh, wrap_friction: f64, offset_n: f64) {
+        self.set_beside(mesh, wrap_friction, offset_n, &mut [f64::NAN; 4]);
+    }
+
+    /// The same; `even` is what contacts of equal wrap came to last, `[μK, qK, ratio, offset]`: limits that change at every step are
+    /// mostly the same for both tendons.
+    pub(crate) fn set_beside(
+        &mut self,
+        mesh: &TendonMesh,
+        wrap_friction: f64,
+        offset_n: f64,
+        even: &mut [f64; 4],
+    ) {
         let n = mesh.elements;
         if wrap_friction == self.wrap_friction && offset_n == self.offset_n {
             return;
         }
-        if wrap_friction != self.wrap_friction {
-            self.wrap_friction = wrap_friction;
-            if mesh.uniform {
+        if mesh.uniform {
+            if [wrap_friction, offset_n] != even[..2] {
                 let ratio = exp(-wrap_friction / n as f64);
+                let offset = contact_offset_n(wrap_friction, offset_n, mesh.wrap_share[0]);
+                *even = [wrap_friction, offset_n, ratio, offset];
+            }
+            let [.., ratio, offset] = *even;
+            if wrap_friction != self.wrap_friction {
                 self.ratio[..n].fill(ratio);
                 self.inverse_ratio[..n].fill(1.0 / ratio);
-            } else {
-                for i in 0..n {
-                    self.ratio[i] = exp(-wrap_friction * mesh.wrap_share[i]);
+            }
+            self.offset_share[..n].fill(offset);
+        } else {
+            for (i, wrap_share) in mesh.wrap_share[..n].iter().enumerate() {
+                if wrap_friction != self.wrap_friction {
+                    self.ratio[i] = exp(-wrap_friction * wrap_share);
                     self.inverse_ratio[i] = 1.0 / self.ratio[i];
                 }
+                self.offset_share[i] = contact_offset_n(wrap_friction, offset_n, *wrap_share);
             }
         }
-        self.offset_n = offset_n;
-        if mesh.uniform {
-            self.offset_share[..n].fill(contact_offset_n(wrap_friction, offset_n, mesh.wrap_share[0]));
-        } else {
-            for (share, wrap) in self.offset_share[..n].iter_mut().zip(&mesh.wrap_share) {
-                *share = contact_offset_n(wrap_friction, offset_n, *wrap);
-            }
-        }
+        (self.wrap_friction, self.offset_n) = (wrap_friction, offset_n);
     }
 }
 

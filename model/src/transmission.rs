@@ -9,6 +9,7 @@ use crate::effect_set::{EffectSet, EffectStates};
 use crate::friction_law::FrictionLaw;
 use crate::parameters::{PulleyParameters, SheathParameters, TendonParameters};
 use crate::play::Play;
+use crate::sheath::presliding::Pull;
 use crate::sheath::{End, SheathError, SlipLimits, Tendon, TendonMesh};
 
 /// Contacts of each tendon unless a rig says otherwise.
@@ -253,13 +254,15 @@ impl Transmission {
                     + state.end_tension_n(&config.mesh, End::Output));
         }
         effects.transmission(states, &mut port);
+        let mut even = [[f64::NAN; 4]; 2];
         for (index, tendon) in port.tendons.iter().enumerate() {
             let wrap_angle_rad = tendon.wrap_angle_rad.max(0.0);
-            for (limits, law) in self.limits[index].iter_mut().zip(&tendon.slip) {
-                limits.set(
+            for ((limits, law), even) in self.limits[index].iter_mut().zip(&tendon.slip).zip(&mut even) {
+                limits.set_beside(
                     &config.mesh,
                     law.friction_coefficient.max(0.0) * wrap_angle_rad,
                     law.friction_n_per_rad.max(0.0) * wrap_angle_rad,
+                    even,
                 );
             }
             let longer_m = tendon.added_length_m - self.added_length_m[index];
@@ -363,18 +366,25 @@ impl Transmission {
         if let Some(wound_rad) = &mut self.wound_excess_rad {
             wound_rad[end as usize] += (self.radius_ratio[end as usize] - 1.0) * delta_rad;
         }
-        let pull_m = match end {
+        let stretch_m = match end {
             End::Input => wound_m,
             End::Output => -wound_m,
         };
-        for (index, sign) in CABLE_SIGN.into_iter().enumerate() {
-            let limits = &self.limits[index][end as usize];
-            let (pull_m, unilateral) = (sign * pull_m, self.unilateral[index]);
-            let (tendon, presliding_m) = (&mut self.tendons[index], self.presliding_m[index]);
+        let pulls = [0, 1].map(|index| Pull {
+            limits: &self.limits[index][end as usize],
+            stretch_m: CABLE_SIGN[index] * stretch_m,
+            unilateral: self.unilateral[index],
+            presliding_m: self.presliding_m[index],
+        });
+        if pulls.iter().all(|pull| pull.presliding_m > 0.0) {
+            return Tendon::move_ends_presliding(&mut self.tendons, &config.mesh, end, pulls);
+        }
+        for (tendon, pull) in self.tendons.iter_mut().zip(pulls) {
+            let Pull { limits, stretch_m, unilateral, presliding_m } = pull;
             if presliding_m > 0.0 {
-                tendon.move_end_presliding(&config.mesh, limits, end, pull_m, unilateral, presliding_m);
+                tendon.move_end_presliding(&config.mesh, limits, end, stretch_m, unilateral, presliding_m);
             } else {
-                tendon.move_end(&config.mesh, limits, end, pull_m, unilateral);
+                tendon.move_end(&config.mesh, limits, end, stretch_m, unilateral);
             }
         }
     }

@@ -176,3 +176,30 @@ fn length_is_kept_and_limits_hold_for_any_step() {
         }
     }
 }
+
+/// Friction that drops leaves contacts beyond their limit. Drawn on, they come back to it within a few travels of δ, from one
+/// side, at a stiffness that is never negative, for steps far below and far above δ.
+#[test]
+fn contacts_beyond_a_limit_that_drops_come_back_to_it() {
+    let mesh = TendonMesh::uniform(8, STIFFNESS_N_PER_M).unwrap();
+    let [high, low] = [1.2, 0.3].map(|wrap_friction| SlipLimits::new(&mesh, wrap_friction, 0.0));
+    let delta_m = 1e-5;
+    for step_m in [0.02 * delta_m, 0.3 * delta_m, 5.0 * delta_m] {
+        let mut tendon = Tendon::at_rest(&mesh, PRETENSION_N);
+        draw(&mut tendon, &mesh, &high, 40.0 * delta_m, step_m, delta_m);
+        let mut ratio = tendon.end_tension_n(&mesh, End::Input) / tendon.end_tension_n(&mesh, End::Output);
+        near("slips at the high limit", ratio / 1.2_f64.exp(), 1.0, 1e-3);
+        // A contact comes back by a limited part in one step.
+        for _ in 0..20.max((10.0 * delta_m / step_m).ceil() as usize) {
+            draw(&mut tendon, &mesh, &low, step_m, step_m, delta_m);
+            let now = tendon.end_tension_n(&mesh, End::Input) / tendon.end_tension_n(&mesh, End::Output);
+            let beyond = now / 0.3_f64.exp();
+            assert!(now <= ratio * (1.0 + 1e-9) && beyond >= 1.0 - 1e-3, "step {step_m} m: {ratio} to {now}");
+            for end in [End::Input, End::Output] {
+                assert!(tendon.end_stiffness_n_per_m(end) > 0.0, "step {step_m} m");
+            }
+            ratio = now;
+        }
+        near(&format!("back at the low limit, steps of {step_m} m"), ratio / 0.3_f64.exp(), 1.0, 5e-3);
+    }
+}

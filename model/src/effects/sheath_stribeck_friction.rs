@@ -59,12 +59,17 @@ impl Effect for SheathStribeckFriction {
 
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], s: &mut EffectState, port: &mut TransmissionPort) {
         let share = -expm1(-port.dt_s / MEMORY_S);
+        // Both tendons mostly slip at the same speed: by end, that speed and the excess there.
+        let mut known = [[f64::NAN; 2]; 2];
         for (tendon, filtered) in port.tendons.iter_mut().zip(s.chunks_mut(2)) {
             let speeds = tendon.slip_speeds_m_s();
-            for ((law, speed), filtered) in tendon.slip.iter_mut().zip(speeds).zip(filtered) {
+            let ends = tendon.slip.iter_mut().zip(speeds).zip(filtered).zip(&mut known);
+            for (((law, speed), filtered), known) in ends {
                 *filtered += share * (speed - *filtered);
-                let excess = (p[0] - 1.0) * exp(-exp(p[2] * log(*filtered / p[1])));
-                law.friction_coefficient *= 1.0 + excess;
+                if known[0] != *filtered {
+                    *known = [*filtered, (p[0] - 1.0) * exp(-exp(p[2] * log(*filtered / p[1])))];
+                }
+                law.friction_coefficient *= 1.0 + known[1];
             }
         }
     }

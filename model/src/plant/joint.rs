@@ -85,7 +85,7 @@ impl Joint {
             let weight_nm = weight_nm(&load, port.mass_kg, self.theta_rad);
             // Viscous friction at the end of the step counts like inertia.
             let slowed = inertia + dt_s * load.viscous_nm_s_per_rad;
-            let driven = (inertia * self.omega_rad_s + dt_s * (torque_nm + weight_nm)) / slowed;
+            let driven = (inertia * self.omega_rad_s + dt_s * (torque_nm + weight_nm)) * slowed.recip();
             let friction = [port.coulomb_nm, port.presliding_rad];
             self.omega_rad_s =
                 after_elastic_friction_rad_s(&mut self.presliding, driven, friction, slowed, dt_s);

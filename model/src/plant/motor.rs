@@ -66,7 +66,7 @@ impl Motor {
         let torque_nm = motor_nm + load_nm + outside_nm + port.torque_nm;
         // Viscous friction at the end of the step counts like inertia.
         let slowed = inertia + step.dt_s * dragged * motor.viscous_nm_s_per_rad;
-        let driven = (inertia * self.omega_rad_s + step.dt_s * torque_nm) / slowed;
+        let driven = (inertia * self.omega_rad_s + step.dt_s * torque_nm) * slowed.recip();
         let friction = [port.coulomb_nm, port.presliding_rad];
         self.omega_rad_s =
             after_elastic_friction_rad_s(&mut self.presliding, driven, friction, slowed, step.dt_s);

@@ -10,10 +10,13 @@
 //! the limit is done. δ → 0 is the rigid contact of [`super`]. Seen from the end that moves the tendon is a ladder; its
 //! compliance `X_j = c_j + r_j X_{j+1} / (1 + κ_j X_{j+1})` follows from the far end inwards with positive terms only,
 //! and the tensions from a second pass outwards. Both passes carry numerator and denominator, `X_j = p_j / q_j`, so that
-//! no division waits for another. First order in `step / δ` and in `μK / n`, stable for any step.
+//! no division waits for another. Each result of a pass waits for the one before it, which takes far longer than its own
+//! operations: both tendons of a pair are moved side by side, as the two lanes of [`f64x2`]. First order in `step / δ` and in `μK / n`, stable for any step.
 //!
 //! Dahl's law has no memory of turning points: a small loop inside a large one does not close exactly, and under a steady
 //! pull a small vibration creeps. Source: P. R. Dahl, Aerospace report TOR-158(3107-18), 1968.
+
+use wide::{CmpGe, CmpGt, CmpLe, f64x2};
 
 use super::{End, FullSlip, MAX_ELEMENTS, SlipLimits, Tendon, TendonMesh};
 
@@ -25,8 +28,21 @@ const LARGEST_RETURN: f64 = 0.5;
 /// them do, and a tendon whose contacts all slip moves on at the cost of its ends.
 const SLIPS: f64 = 1e-5;
 
-/// Segments of a tendon whose passes need little room.
-const SMALL: usize = 9;
+/// Segments of a tendon of eight and of sixteen contacts: their passes need little room.
+const SMALL: [usize; 2] = [9, 17];
+
+/// How one end of a tendon moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pull<'a> {
+    /// Friction limits for slip from that end.
+    pub limits: &'a SlipLimits,
+    /// Positive stretches the tendon, m.
+    pub stretch_m: f64,
+    /// As for [`Tendon::move_end`].
+    pub unilateral: bool,
+    /// Travel over which contacts give way, m, greater than 0.
+    pub presliding_m: f64,
+}
 
 impl Tendon {
     /// Moves one end by `pull_m` (positive stretches the tendon) with contacts that give way over `presliding_m` > 0.
@@ -37,105 +53,81 @@ impl Tendon {
         mesh: &TendonMesh,
         limits: &SlipLimits,
         end: End,
-        mut pull_m: f64,
-        unilateral: bool,
-        presliding_m: f64,
-    ) {
-        let index = end as usize;
-        if pull_m > 0.0 {
-            let taken = pull_m.min(self.slack_m[index]);
-            self.slack_m[index] -= taken;
-            pull_m -= taken;
-        }
-        if pull_m == 0.0 || self.slide(mesh, limits, end, pull_m) {
-            return;
-        }
-        self.fill_in(mesh);
-        self.full_slip = None;
-        let n = mesh.elements;
-        if n < SMALL {
-            self.climb::<SMALL>(mesh, limits, end, pull_m, unilateral, presliding_m);
-        } else {
-            self.climb::<{ MAX_ELEMENTS + 1 }>(mesh, limits, end, pull_m, unilateral, presliding_m);
-        }
-        let from_output = end == End::Output;
-        let far = if from_output { End::Input } else { End::Output };
-        let loose_m = self.slack_m[far as usize];
-        if unilateral && loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
-            // The far end hangs loose: let it slide in until it is tight or carries nothing.
-            self.slack_m[far as usize] = 0.0;
-            self.move_end_presliding(mesh, limits, far, -loose_m, unilateral, presliding_m);
-        }
-    }
-
-    /// The two passes along the ladder of at most `SEGMENTS` segments.
-    fn climb<const SEGMENTS: usize>(
-        &mut self,
-        mesh: &TendonMesh,
-        limits: &SlipLimits,
-        end: End,
         pull_m: f64,
         unilateral: bool,
         presliding_m: f64,
     ) {
+        let mut pull = Pull { limits, stretch_m: pull_m, unilateral, presliding_m };
+        if self.slide_or_wait(mesh, end, &mut pull) {
+            climb(&mut [(self, pull)], mesh, end);
+        }
+    }
+
+    /// Moves the same end of both tendons of a pair, at the cost of one.
+    pub(crate) fn move_ends_presliding(
+        [a, b]: &mut [Self; 2],
+        mesh: &TendonMesh,
+        end: End,
+        [mut pull_a, mut pull_b]: [Pull<'_>; 2],
+    ) {
+        let climbs = [a.slide_or_wait(mesh, end, &mut pull_a), b.slide_or_wait(mesh, end, &mut pull_b)];
+        match climbs {
+            [false, false] => {}
+            [true, true] => climb(&mut [(a, pull_a), (b, pull_b)], mesh, end),
+            [true, false] => climb(&mut [(a, pull_a)], mesh, end),
+            [false, true] => climb(&mut [(b, pull_b)], mesh, end),
+        }
+    }
+
+    /// Takes slack off the pull and moves on what slips as a whole; whether contacts have to be looked at for the rest.
+    fn slide_or_wait(&mut self, mesh: &TendonMesh, end: End, pull: &mut Pull<'_>) -> bool {
+        if pull.stretch_m > 0.0 {
+            let slack_m = &mut self.slack_m[end as usize];
+            let taken = pull.stretch_m.min(*slack_m);
+            *slack_m -= taken;
+            pull.stretch_m -= taken;
+        }
+        if pull.stretch_m == 0.0 || self.slide(mesh, pull.limits, end, pull.stretch_m) {
+            return false;
+        }
+        self.fill_in(mesh);
+        self.full_slip = None;
+        true
+    }
+
+    /// Takes over what a lane of the climb has found.
+    fn take_over<const SEGMENTS: usize>(
+        &mut self,
+        mesh: &TendonMesh,
+        end: End,
+        pull: &Pull<'_>,
+        (climbed, lane): (&Climbed<SEGMENTS>, usize),
+    ) {
         let index = end as usize;
         let n = mesh.elements;
         let from_output = end == End::Output;
-        let segment = |j: usize| if from_output { n - j } else { j };
-        let contact = |i: usize| if from_output { n - 1 - i } else { i };
-        let pulled = pull_m > 0.0;
-        // No contact travels farther than the end: the chord of the exponential up to there never passes the limit.
-        let decay_per_m = mobilised(pull_m.abs() / presliding_m) / pull_m.abs();
-
-        // Per contact: dT_{j+1} = slope dT_j - grip x, turned into x = share X_{j+1} dT_j, share = slope / (1 + grip X).
-        let mut slopes = [0.0; SEGMENTS];
-        let mut denominators = [1.0; SEGMENTS];
-        let mut numerator = mesh.compliance_m_per_n[segment(n)];
-        let mut all_slip = true;
-        for i in (0..n).rev() {
-            let (near, far) = (self.tension_n[segment(i)], self.tension_n[segment(i + 1)]);
-            let (down, up) = (limits.ratio[contact(i)], limits.inverse_ratio[contact(i)]);
-            let offset = limits.offset_share[contact(i)];
-            let range = (up - down) * near + (up + 1.0) * offset;
-            let (slope, grip) = if range > 0.0 && near > 0.0 {
-                let above = far - (down * near - offset);
-                let gap = if pulled { above } else { range - above };
-                all_slip &= gap.abs() <= SLIPS * range;
-                (down + (above / range).clamp(0.0, 1.0) * (up - down), gap * decay_per_m)
-            } else {
-                all_slip = false;
-                (1.0, 0.0)
-            };
-            let behind = denominators[i + 1];
-            let denominator = behind + (grip * numerator).max(-LARGEST_RETURN * behind);
-            numerator = mesh.compliance_m_per_n[segment(i)] * denominator + slope * numerator;
-            slopes[i] = slope;
-            denominators[i] = denominator;
-        }
-
-        let stiffness_n_per_m = denominators[0] / numerator;
-        let mut rise_n = pull_m * stiffness_n_per_m;
-        let tension = self.tension_n[segment(0)];
-        if unilateral && tension + rise_n < 0.0 {
-            self.slack_m[index] -= (tension + rise_n) / stiffness_n_per_m;
-            rise_n = -tension;
+        for (j, tension) in climbed.tension_n.iter().enumerate().take(n + 1) {
+            self.tension_n[if from_output { n - j } else { j }] = tension.as_array_ref()[lane];
         }
         self.front[index] = n;
-        self.stiffness_n_per_m[index] = stiffness_n_per_m;
-        let floor = if unilateral { 0.0 } else { f64::NEG_INFINITY };
-        let mut scaled_rise_n = rise_n / denominators[0];
-        for (j, (slope, denominator)) in slopes.iter().zip(&denominators).enumerate().take(n + 1) {
-            let tension = self.tension_n[segment(j)] + scaled_rise_n * denominator;
-            self.tension_n[segment(j)] = tension.max(floor);
-            // What a segment would push is slack instead.
-            self.slack_m[index] += (floor - tension).max(0.0) * mesh.compliance_m_per_n[segment(j)];
-            scaled_rise_n *= slope;
-        }
+        self.stiffness_n_per_m[index] = climbed.stiffness_n_per_m[lane];
+        self.slack_m[index] += climbed.slack_m[lane];
+        let limits = pull.limits;
         let friction = [limits.wrap_friction, limits.offset_n];
         // Limits that change from step to step would end it at once.
         let steady = core::mem::replace(&mut self.friction_before, friction) == friction;
-        if all_slip && steady && self.slack_m == [0.0; 2] {
-            self.begin_full_slip(mesh, limits, pulled != from_output);
+        if climbed.all_slip[lane] && steady && self.slack_m == [0.0; 2] {
+            self.begin_full_slip(mesh, limits, (pull.stretch_m > 0.0) != from_output);
+        }
+    }
+
+    /// Lets a far end that hangs loose slide in until it is tight or carries nothing.
+    fn take_in_far_end(&mut self, mesh: &TendonMesh, end: End, pull: &Pull<'_>) {
+        let far = if end == End::Output { End::Input } else { End::Output };
+        let loose_m = self.slack_m[far as usize];
+        if pull.unilateral && loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
+            self.slack_m[far as usize] = 0.0;
+            self.move_end_presliding(mesh, pull.limits, far, -loose_m, true, pull.presliding_m);
         }
     }
 
@@ -163,6 +155,136 @@ impl Tendon {
     }
 }
 
+/// One or two tendons after a climb along their ladders.
+struct Climbed<const SEGMENTS: usize> {
+    /// Tension from the end that moved.
+    tension_n: [f64x2; SEGMENTS],
+    /// Slope of the tension over the move.
+    stiffness_n_per_m: [f64; 2],
+    /// Slack that the end has more.
+    slack_m: [f64; 2],
+    /// Whether all contacts are on their limit.
+    all_slip: [bool; 2],
+}
+
+/// Moves the same end of one or two tendons along their ladders.
+fn climb(moved: &mut [(&mut Tendon, Pull<'_>)], mesh: &TendonMesh, end: End) {
+    match mesh.elements {
+        n if n < SMALL[0] => climb_within::<{ SMALL[0] }>(moved, mesh, end),
+        n if n < SMALL[1] => climb_within::<{ SMALL[1] }>(moved, mesh, end),
+        _ => climb_within::<{ MAX_ELEMENTS + 1 }>(moved, mesh, end),
+    }
+}
+
+/// The same for ladders of at most `SEGMENTS` segments, with no more room than they need.
+#[inline(never)]
+fn climb_within<const SEGMENTS: usize>(moved: &mut [(&mut Tendon, Pull<'_>)], mesh: &TendonMesh, end: End) {
+    let (Some((a, pull_a)), Some((b, pull_b))) = (moved.first(), moved.last()) else { return };
+    let climbed = passes::<SEGMENTS>([a, b], mesh, end, [pull_a, pull_b]);
+    for (lane, (tendon, pull)) in moved.iter_mut().enumerate() {
+        tendon.take_over(mesh, end, pull, (&climbed, lane));
+        tendon.take_in_far_end(mesh, end, pull);
+    }
+}
+
+/// The passes along two ladders, side by side.
+fn passes<const SEGMENTS: usize>(
+    tendons: [&Tendon; 2],
+    mesh: &TendonMesh,
+    end: End,
+    pulls: [&Pull<'_>; 2],
+) -> Climbed<SEGMENTS> {
+    let n = mesh.elements.min(SEGMENTS - 1);
+    let from_output = end == End::Output;
+    let segment = |j: usize| if from_output { n - j } else { j };
+    let contact = |i: usize| if from_output { n - 1 - i } else { i };
+    let both = |of: &dyn Fn(&Pull<'_>) -> f64| f64x2::from(pulls.map(of));
+    let pull_m = both(&|pull| pull.stretch_m);
+    let pulled = pull_m.cmp_gt(f64x2::ZERO);
+    // No contact travels farther than the end: the chord of the exponential up to there never passes the limit.
+    let decay_per_m =
+        both(&|pull| mobilised(pull.stretch_m.abs() / pull.presliding_m) / pull.stretch_m.abs());
+    let limit = |of: fn(&SlipLimits) -> &[f64; MAX_ELEMENTS], i: usize| {
+        f64x2::from(pulls.map(|pull| of(pull.limits)[contact(i)]))
+    };
+
+    let mut tension_n = [f64x2::ZERO; SEGMENTS];
+    for (j, tension) in tension_n.iter_mut().enumerate().take(n + 1) {
+        *tension = f64x2::from(tendons.map(|tendon| tendon.tension_n[segment(j)]));
+    }
+
+    // Per contact: dT_{j+1} = slope dT_j - grip x, turned into x = share X_{j+1} dT_j, share = slope / (1 + grip X).
+    let mut slopes = [f64x2::ONE; SEGMENTS];
+    let mut grips = [f64x2::ZERO; SEGMENTS];
+    let mut all_slip = f64x2::ZERO.cmp_ge(f64x2::ZERO);
+    for i in 0..n {
+        let (near, far) = (tension_n[i], tension_n[i + 1]);
+        let (down, up) = (limit(|limits| &limits.ratio, i), limit(|limits| &limits.inverse_ratio, i));
+        let offset = limit(|limits| &limits.offset_share, i);
+        let width = up - down;
+        let range = width * near + (up + f64x2::ONE) * offset;
+        let above = far - (down * near - offset);
+        let gap = pulled.blend(above, range - above);
+        let holds = range.cmp_gt(f64x2::ZERO) & near.cmp_gt(f64x2::ZERO);
+        let place = (above / range).fast_max(f64x2::ZERO).fast_min(f64x2::ONE);
+        all_slip &= holds & gap.abs().cmp_le(range * SLIPS);
+        slopes[i] = holds.blend(down + place * width, f64x2::ONE);
+        grips[i] = holds.blend(gap * decay_per_m, f64x2::ZERO);
+    }
+
+    let compliance = |j: usize| f64x2::splat(mesh.compliance_m_per_n[segment(j)]);
+    let mut denominators = [f64x2::ONE; SEGMENTS];
+    let mut denominator = f64x2::ONE;
+    let mut numerator = compliance(n);
+    for i in (0..n).rev() {
+        let (slope, grip, own) = (slopes[i], grips[i], compliance(i));
+        let (behind, held) = (denominator, grip * numerator);
+        // Without waiting for the new denominator: own (behind + held) + slope numerator.
+        denominator = behind + held;
+        let without_waiting = own * behind + (own * grip + slope) * numerator;
+        let returns = behind * -LARGEST_RETURN;
+        numerator = if returns.cmp_gt(held).any() {
+            denominator = behind + held.fast_max(returns);
+            own * denominator + slope * numerator
+        } else {
+            without_waiting
+        };
+        denominators[i] = denominator;
+    }
+
+    let stiffness_n_per_m = denominator / numerator;
+    let mut rise_n = (pull_m * stiffness_n_per_m).to_array();
+    let stiffness_n_per_m = stiffness_n_per_m.to_array();
+    let mut slack_m = [0.0; 2];
+    for (lane, pull) in pulls.into_iter().enumerate() {
+        let tension = tension_n[0].as_array_ref()[lane];
+        if pull.unilateral && tension + rise_n[lane] < 0.0 {
+            slack_m[lane] = -(tension + rise_n[lane]) / stiffness_n_per_m[lane];
+            rise_n[lane] = -tension;
+        }
+    }
+    let mut scaled_rise_n = f64x2::from(rise_n) / denominator;
+    if pulls.iter().any(|pull| pull.unilateral) {
+        let floor = both(&|pull| if pull.unilateral { 0.0 } else { f64::NEG_INFINITY });
+        let mut slack = f64x2::from(slack_m);
+        for j in 0..=n {
+            let tension = tension_n[j] + scaled_rise_n * denominators[j];
+            tension_n[j] = tension.fast_max(floor);
+            // What a segment would push is slack instead.
+            slack += (floor - tension).fast_max(f64x2::ZERO) * compliance(j);
+            scaled_rise_n *= slopes[j];
+        }
+        slack_m = slack.to_array();
+    } else {
+        for j in 0..=n {
+            tension_n[j] += scaled_rise_n * denominators[j];
+            scaled_rise_n *= slopes[j];
+        }
+    }
+    let all_slip = all_slip.move_mask();
+    Climbed { tension_n, stiffness_n_per_m, slack_m, all_slip: [all_slip & 1 != 0, all_slip & 2 != 0] }
+}
+
 /// `1 - e^{-z}` for `z >= 0`, within 3e-4 and never above 1: `e^{z/4}` to its fourth order, taken to the fourth power.
 fn mobilised(z: f64) -> f64 {
     let x = 0.25 * z;
@@ -173,7 +295,46 @@ fn mobilised(z: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::mobilised;
+    use super::{Pull, mobilised};
+    use crate::sheath::{End, SlipLimits, Tendon, TendonMesh};
+
+    /// Two tendons of different friction, pretension and slack, pulled and released until they slide, turn, hang loose and are
+    /// tightened again: each does, bit for bit, what it does alone.
+    #[test]
+    fn a_pair_moves_as_each_of_its_tendons_alone() {
+        for elements in [4, 8, 9, 16, 17, 64] {
+            let mesh = TendonMesh::uniform(elements, 72_900.0).unwrap();
+            let limits = [SlipLimits::new(&mesh, 0.4, 0.0), SlipLimits::new(&mesh, 0.9, 0.3)];
+            let mut pair = [30.0, 12.0].map(|tension_n| Tendon::at_rest(&mesh, tension_n));
+            let mut alone = pair;
+            let (mut climbs, mut slack_steps) = ([0; 4], 0);
+            for step in 0..4000 {
+                let end = if step % 2 == 0 { End::Input } else { End::Output };
+                // Drawn to and fro through their sheaths, at unequal times; b is let out at first and taken in again.
+                let drawn = |period: i32| if step / period % 2 == 0 { 2e-6 } else { -2e-6 };
+                let towards_input = if end == End::Input { 1.0 } else { -1.0 };
+                let let_out_m = if step < 2000 { -4e-7 } else { 5e-7 };
+                let stretch_m = [towards_input * drawn(500), towards_input * drawn(800) + let_out_m];
+                let pulls = [0, 1].map(|lane| Pull {
+                    limits: &limits[lane],
+                    stretch_m: stretch_m[lane],
+                    unilateral: lane == 1,
+                    presliding_m: 1e-5 * (1.0 + lane as f64),
+                });
+                let slid = alone.map(|tendon| tendon.full_slip.is_some());
+                climbs[usize::from(slid[0]) + 2 * usize::from(slid[1])] += 1;
+                Tendon::move_ends_presliding(&mut pair, &mesh, end, pulls);
+                for (tendon, pull) in alone.iter_mut().zip(pulls) {
+                    let Pull { limits, stretch_m, unilateral, presliding_m } = pull;
+                    tendon.move_end_presliding(&mesh, limits, end, stretch_m, unilateral, presliding_m);
+                }
+                assert_eq!(pair, alone, "{elements} contacts, step {step}");
+                slack_steps += i32::from(pair[1].slack_m != [0.0; 2]);
+            }
+            assert!(climbs.iter().all(|steps| *steps > 0), "{elements} contacts: {climbs:?}");
+            assert!(slack_steps > 100, "{elements} contacts: {slack_steps}");
+        }
+    }
 
     #[test]
     fn friction_is_mobilised_as_the_exponential_says_and_never_beyond_the_limit() {
