@@ -193,12 +193,7 @@ impl Case<'_> {
     /// The whole diagnosis.
     fn diagnosed(&self, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
         let Self { objective, model, .. } = *self;
-        let search = JointModel {
-            elements: model.elements.min(search_elements(model)),
-            step_s: model.step_s.max(SEARCH_STEP_S),
-            ..model.clone()
-        };
-        let mut selected = select(objective, &search, asked, progress)?;
+        let mut selected = select(objective, &at_search_resolution(model, model), asked, progress)?;
         let before = Stage::of(objective, model)?;
         progress.stage("refining", 0);
         let rounds: &[f64] = if selected.complete && !self.tensions_unseen() { &[FINE_STEP] } else { &[] };
@@ -272,6 +267,15 @@ struct Case<'a> {
     benches: Vec<(&'a Bench, Variation)>,
     /// Where the motions that separate hypotheses may go.
     allowed: Allowed<'a>,
+}
+
+/// `model` as coarse as `stated` may be while candidates are tried.
+fn at_search_resolution(model: &JointModel, stated: &JointModel) -> JointModel {
+    JointModel {
+        elements: stated.elements.min(search_elements(stated)),
+        step_s: stated.step_s.max(SEARCH_STEP_S),
+        ..model.clone()
+    }
 }
 
 fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
@@ -422,8 +426,9 @@ impl Case<'_> {
             !laws.is_empty(),
             [loss_recalibrated, loss_after],
         );
+        let coarse = at_search_resolution(&last.model, model);
         let mut indistinguishable =
-            crate::fit::identifiability::indistinguishable(objective, &last.model).unwrap_or_default();
+            crate::fit::identifiability::indistinguishable(objective, &coarse).unwrap_or_default();
         let benches = self.benches.iter();
         let now: Vec<BenchNow> =
             benches.map(|bench| self.now(bench, &last.model, &recalibrated_parameters, clock_s)).collect();
