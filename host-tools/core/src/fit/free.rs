@@ -53,10 +53,10 @@ pub struct Free {
 /// its difference quotients is half of a standard deviation at most.
 const CLOSELY_KNOWN: f64 = 0.2;
 
-/// Whether a parameter is a moment at which something happens.
+/// Whether a parameter is a moment at which something happens, and which is looked for.
 #[must_use]
 pub fn is_moment(spec: &ParameterSpec) -> bool {
-    spec.unit == "s" && spec.scale == Scale::Linear
+    spec.unit == "s" && spec.scale == Scale::Linear && spec.searched
 }
 
 /// Size of the optimiser's coordinate of a rate: a wave that is a tenth faster is out of step after a few periods, and slopes over such a
