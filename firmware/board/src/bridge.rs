@@ -80,7 +80,8 @@ impl Bridge {
     /// Whether the bridge reports a fault, or has since it was switched on.
     #[expect(clippy::unused_self, reason = "asks the timer that this value owns")]
     pub fn fault(&self) -> bool {
-        pac::TIM1.sr().read().bif(0)
+        let status = pac::TIM1.sr().read();
+        status.bif(0) || status.sbif()
     }
 
     /// Duty of the coming PWM period and on or off; off acts at once.
@@ -90,7 +91,10 @@ impl Bridge {
         self.pwm.set_duty(Channel::Ch2, (HALF_PERIOD - offset) as u32);
         if !on {
             // While the fault line is low the flag comes back at once.
-            pac::TIM1.sr().modify(|status| status.set_bif(0, false));
+            pac::TIM1.sr().modify(|status| {
+                status.set_bif(0, false);
+                status.set_sbif(false);
+            });
         }
         if on != self.on {
             self.on = on;

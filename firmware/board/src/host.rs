@@ -6,7 +6,7 @@ use bowden_control::correction::ripple_table::RippleTable;
 use bowden_control::parameters::Parameters;
 use bowden_control::service::{Identity, ParameterStore, Port, Reply, Service, StoreError, View};
 use bowden_control::tick::Command;
-use bowden_link::message::{Boot, Provocation};
+use bowden_link::message::{Boot, Chip, Provocation};
 use bowden_link::{Accumulator, Fault, FaultRecord, FromBoard, Request, Sample, State};
 use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::select::{Either, select};
@@ -143,11 +143,11 @@ impl Host {
         loaded: Loaded,
         store: ParameterStore<BoardFlash>,
         ends: HostEnds,
-        boot: Boot,
+        (boot, chip): (Boot, Chip),
         ended: &Ended,
     ) -> Self {
         let Loaded { parameters, unreadable, table } = loaded;
-        let identity = Identity { firmware: env!("CARGO_PKG_VERSION"), board: BOARD, boot };
+        let identity = Identity { firmware: env!("CARGO_PKG_VERSION"), board: BOARD, boot, chip };
         let mut reach = Reach { ends, state: State::Off, fault: None };
         let broken = if unreadable {
             Some(Fault::ParameterStoreCorrupt)

@@ -18,6 +18,7 @@
 
 mod analog;
 mod bridge;
+mod chip;
 mod clock;
 mod encoder_bus;
 mod encoders;
@@ -62,11 +63,18 @@ async fn main(spawner: Spawner) {
     // The HAL leaves its time driver at priority 0, which critical sections do not mask.
     interrupt::TIM5.set_priority(Priority::P3);
     let boot = retained::boot_cause();
-    let p = clock::init();
+    let (p, clock_source) = clock::init();
+    let chip = chip::state(clock_source);
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
     let ended = retained::take(boot);
-    defmt::info!("bowden {=str}, boot by {}, ended by {}", env!("CARGO_PKG_VERSION"), boot, ended.fault);
+    defmt::info!(
+        "bowden {=str}, boot by {}, ended by {}, {}",
+        env!("CARGO_PKG_VERSION"),
+        boot,
+        ended.fault,
+        chip
+    );
 
     let flash = BlockingAsync::new(Flash::new_blocking(p.FLASH));
     let mut store = ParameterStore::new(flash, STORE).expect("the store fits the flash");
@@ -83,7 +91,7 @@ async fn main(spawner: Spawner) {
     encoders::start(parameters.encoder_parts());
     let queues = queues::split();
     // Puts the order to stop after a bad end into the queue before the first tick.
-    let host = host::Host::new(loaded, store, queues.host, boot, &ended);
+    let host = host::Host::new(loaded, store, queues.host, (boot, chip), &ended);
     tick::start(&parameters, bridge, analog, Output::new(p.PC8, Level::Low, Speed::VeryHigh), queues.tick);
 
     let (port, device) = usb::new(p.USB, p.PA12, p.PA11);

@@ -5,6 +5,7 @@ use core::panic::PanicInfo;
 use bowden_link::Fault;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
+use embassy_stm32::pac;
 
 use crate::{bridge, retained};
 
@@ -33,4 +34,16 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
         format_args!("at {:#010x}, called from {:#010x}, CFSR {status:#010x}", frame.pc(), frame.lr()),
     );
     SCB::sys_reset()
+}
+
+/// The clock's security system (RM0440, 7.2.8): the crystal stopped, hardware has opened the bridge and goes on with 16 MHz.
+#[exception]
+#[allow(unsafe_code, reason = "the macro asks for an unsafe function")]
+unsafe fn NonMaskableInt() {
+    if pac::RCC.cifr().read().cssf() {
+        bridge::off();
+        retained::keep(Fault::ClockFailed, format_args!(""));
+        // At 170 MHz no tick would be in time again; the next start finds out what runs.
+        SCB::sys_reset();
+    }
 }

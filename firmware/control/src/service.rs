@@ -8,7 +8,9 @@ mod shelf;
 pub mod store;
 pub mod table_store;
 
-use bowden_link::message::{Boot, Goal, Greeting, Mode, Parameter, Provocation, Reference, Refusal, Status};
+use bowden_link::message::{
+    Boot, Chip, Goal, Greeting, Mode, Parameter, Provocation, Reference, Refusal, Status,
+};
 use bowden_link::{
     Fault, FaultRecord, FromBoard, Limits, PROTOCOL_VERSION, Request, SCHEMA, Sample, State, ToBoard,
 };
@@ -75,6 +77,8 @@ pub struct Identity {
     pub board: &'static str,
     /// What started this run.
     pub boot: Boot,
+    /// What it found of its processor.
+    pub chip: Chip,
 }
 
 /// What to do with a request.
@@ -248,6 +252,7 @@ impl Service {
             board: cut(self.identity.board),
             parameters: Parameters::COUNT,
             boot: self.identity.boot,
+            chip: self.identity.chip,
         })
     }
 

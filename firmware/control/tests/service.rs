@@ -7,7 +7,7 @@ use bowden_control::parameters::Parameters;
 use bowden_control::service::{Identity, Port, Reply, Service, StoreError, View};
 use bowden_control::tick::Command;
 use bowden_link::message::{
-    Boot, Goal, Mode, Provocation, Reference, Refusal, Shape, TABLE_CHUNK, TABLE_POINTS, TableReport,
+    Boot, Chip, Goal, Mode, Provocation, Reference, Refusal, Shape, TABLE_CHUNK, TABLE_POINTS, TableReport,
 };
 use bowden_link::{Fault, FromBoard, PROTOCOL_VERSION, Request, Sample, State, ToBoard};
 
@@ -55,7 +55,7 @@ impl Port for Tick {
 }
 
 fn service() -> Service {
-    let identity = Identity { firmware: "0.1.0", board: "test", boot: Boot::Power };
+    let identity = Identity { firmware: "0.1.0", board: "test", boot: Boot::Power, chip: Chip::EXPECTED };
     Service::new(identity, Parameters::default(), "")
 }
 

@@ -131,6 +131,7 @@ faults! {
     34 Panic "" "the firmware stopped itself" "report this with the panic text";
     35 HardFault "" "the processor met an instruction or address that it cannot use" "report this with the fault record";
     36 RippleTableCorrupt "" "the stored ripple table cannot be read" "write the table anew or clear it, then store: bowden params table";
+    37 ClockFailed "" "the crystal of the processor stopped" "check the crystal; until it runs again, times are good to 1 % only";
     40 SelfTestTimeout "s" "the self test did not end in time" "see which sensor is not steady at rest";
     41 PretensionOff "N" "tension at rest is not the pretension" "set the pretension, or correct the parameter tendon.pretension";
     42 HomingTimeout "s" "the joint did not reach angle zero in time" "look for a blocked joint or a wrong encoder direction";

@@ -164,6 +164,35 @@ pub struct Greeting {
     pub parameters: u16,
     /// What started the present run.
     pub boot: Boot,
+    /// What the firmware found of its processor at the start.
+    pub chip: Chip,
+}
+
+/// State of the processor at the start: what a board has to have right before it drives a motor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Chip {
+    /// Source of the control period, and so of all times.
+    pub clock: ClockSource,
+    /// Banks of the flash, 1 or 2. With one, erasing a page stops the control tick.
+    pub flash_banks: u8,
+    /// Level of the brown-out reset in the option bytes, 0 (1.7 V) to 4 (2.8 V).
+    pub brown_out_level: u8,
+}
+
+impl Chip {
+    /// What an image expects, and what a simulated board has.
+    pub const EXPECTED: Self = Self { clock: ClockSource::Crystal, flash_banks: 2, brown_out_level: 4 };
+}
+
+/// Oscillator that the control period is counted with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ClockSource {
+    /// Crystal: times are good to 0.01 %.
+    Crystal,
+    /// Oscillator of the processor, because the crystal does not run: times are good to 1 %.
+    Internal,
 }
 
 /// What started the present run of the firmware.
@@ -178,6 +207,15 @@ pub enum Boot {
     Software,
     /// The watchdog.
     Watchdog,
+}
+
+impl fmt::Display for ClockSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Crystal => "crystal",
+            Self::Internal => "internal oscillator, for the crystal does not run: times are good to 1 % only",
+        })
+    }
 }
 
 /// A parameter with all there is to know about it.

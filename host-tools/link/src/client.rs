@@ -96,6 +96,7 @@ impl Client {
             board: heapless::String::new(),
             parameters: 0,
             boot: bowden_link::message::Boot::Power,
+            chip: bowden_link::message::Chip::EXPECTED,
         };
         let patience = timeout / ATTEMPTS;
         let mut client = Self { transport, port: port.into(), timeout, patience, greeting, wire };

@@ -4,6 +4,7 @@
 //! schema = "bowden-parameters/1"
 //! firmware = "0.1.0"                # where they came from; not compared when they are loaded
 //! board = "..."
+//! clock = "crystal"                 # what its times are counted with
 //! tendon.pretension_n = 30.0        # N, 1.0 to 90.0, default 30.0
 //! ```
 
@@ -25,13 +26,14 @@ use super::error::LinkError;
 pub const PARAMETER_SCHEMA: &str = "bowden-parameters/1";
 
 /// Keys of a file that are no parameters.
-const HEADER: [&str; 3] = ["schema", "firmware", "board"];
+const HEADER: [&str; 4] = ["schema", "firmware", "board", "clock"];
 
 /// All parameters of a board, and what it calls itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
     firmware: String,
     board: String,
+    clock: String,
     parameters: Vec<Parameter>,
 }
 
@@ -47,6 +49,7 @@ impl ParameterSet {
         Ok(Self {
             firmware: greeting.firmware.as_str().to_owned(),
             board: greeting.board.as_str().to_owned(),
+            clock: greeting.chip.clock.to_string(),
             parameters,
         })
     }
@@ -123,10 +126,11 @@ impl ParameterSet {
     pub fn to_toml(&self) -> String {
         let mut text = format!(
             "# Parameters of a joint driver board; to load them: bowden params --port PORT load FILE\n\
-             schema = {}\nfirmware = {}\nboard = {}\n\n",
+             schema = {}\nfirmware = {}\nboard = {}\nclock = {}\n\n",
             quoted(PARAMETER_SCHEMA),
             quoted(&self.firmware),
-            quoted(&self.board)
+            quoted(&self.board),
+            quoted(&self.clock)
         );
         for parameter in &self.parameters {
             let Parameter { name, unit, value, minimum, maximum, default, .. } = parameter;
@@ -166,7 +170,12 @@ impl ParameterSet {
 
     /// Where a recording came from, as a format with room for it keeps it.
     pub fn metadata(&self) -> BTreeMap<String, String> {
-        let header = [("schema", PARAMETER_SCHEMA), ("firmware", &self.firmware), ("board", &self.board)];
+        let header = [
+            ("schema", PARAMETER_SCHEMA),
+            ("firmware", &self.firmware),
+            ("board", &self.board),
+            ("clock", &self.clock),
+        ];
         let header = header.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned()));
         let parameters = self
             .parameters

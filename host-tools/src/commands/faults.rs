@@ -49,6 +49,7 @@ impl FaultsArguments {
             Boot::Watchdog => "the watchdog",
         };
         let _ = writeln!(text, "firmware {} on {}, started by: {boot}", greeting.firmware, greeting.board);
+        let _ = writeln!(text, "clock: {}", greeting.chip.clock);
         let panic = client.panic_text()?;
         if !panic.is_empty() {
             let _ = writeln!(text, "panic before that: {}", bowden_core::outcome::one_line(&panic));

@@ -7,7 +7,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
-use bowden_link::message::{Boot, Goal, Greeting, Mode, Parameter, Reference, Refusal, Status, TableReport};
+use bowden_link::message::{
+    Boot, Chip, ClockSource, Goal, Greeting, Mode, Parameter, Reference, Refusal, Status, TableReport,
+};
 use bowden_link::sample::BATCH_LENGTH;
 use bowden_link::{
     Answer, Batch, Fault, FaultRecord, FromBoard, Limits, PROTOCOL_VERSION, Request, SCHEMA, Sample, State,
@@ -333,6 +335,7 @@ impl Fake {
                     board: "fake".try_into().unwrap(),
                     parameters: PARAMETERS.len() as u16,
                     boot: Boot::Watchdog,
+                    chip: Chip { clock: ClockSource::Internal, ..Chip::EXPECTED },
                 }));
             }
             ToBoard::ReadParameter(index) => {

@@ -152,6 +152,7 @@ fn a_fault_during_the_run_is_reported_and_keeps_the_recording() {
         &record.to_string(),
         "limits that act: reference stream empty, last one held",
         "firmware 9.8.7 on fake, started by: the watchdog",
+        "clock: internal oscillator, for the crystal does not run: times are good to 1 % only",
         "panic before that: index out of bounds at tick.rs:7",
         "samples of the last ticks: 64",
         "fault cleared",

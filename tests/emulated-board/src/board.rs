@@ -430,6 +430,7 @@ impl Board {
                 Injection::EncoderBus(at) => {
                     machine.bus.stalled_encoders[usize::from(at == EncoderAt::Joint)] = on;
                 }
+                Injection::Crystal => machine.bus.set_crystal(!on, now),
                 Injection::HostSilent => machine.bus.host.silent = on,
                 Injection::HostNotReading => machine.bus.host.withheld = on,
                 _ => {}

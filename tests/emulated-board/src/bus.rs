@@ -81,8 +81,6 @@ pub(crate) struct Bus {
     bridge_fault: bool,
     /// Encoders whose SPI asks DMA for nothing.
     pub stalled_encoders: [bool; 2],
-    /// Cycle by which a fast clock must have boost mode.
-    boost_deadline: u64,
     /// A reset that a peripheral asks for.
     pub reset_request: Option<ResetCause>,
     /// What ends the run.
@@ -121,7 +119,6 @@ impl Bus {
             trace: Trace::new(),
             bridge_fault: false,
             stalled_encoders: [false; 2],
-            boost_deadline: NEVER,
             reset_request: None,
             failure: None,
             accesses: 0,
@@ -137,7 +134,6 @@ impl Bus {
         self.trace.event(now, Kind::Reset, &[]);
         self.rcc.reset(cause);
         self.clock.set_hz(now, HSI_HZ);
-        self.boost_deadline = NEVER;
         self.pwr = Pwr::new();
         self.syscfg = Syscfg::new();
         self.exti = Exti::new();
@@ -205,7 +201,6 @@ impl Bus {
             .min(self.spi[1].next_event())
             .min(self.flash.next_event())
             .min(self.watchdog.next_event())
-            .min(self.boost_deadline)
             .min(self.clock.cycle_at(self.host.next_s()))
     }
 
@@ -228,17 +223,6 @@ impl Bus {
                 let miso = self.exchange(index, frame.bits, frame.start, frame.end);
                 self.spi[index].finish(miso);
             }
-        }
-        if self.boost_deadline <= at {
-            self.boost_deadline = NEVER;
-            self.fail(BoardError::Part {
-                part: "core supply",
-                at_s: self.seconds(at),
-                reason: format!(
-                    "SYSCLK of {} Hz without boost mode (PWR_CR5 bit 8, R1MODE, is set), expected at most 150 MHz",
-                    self.rcc.sysclk_hz()
-                ),
-            });
         }
         if self.flash.next_event() <= at {
             self.flash.advance(at);
@@ -367,6 +351,27 @@ impl Bus {
     pub(crate) fn dma_done(&mut self, channel: usize) {
         self.dma_beats += 1;
         self.dma.done(channel);
+    }
+
+    /// Whether something asks for the NMI.
+    pub(crate) fn nmi(&self) -> bool {
+        self.rcc.nmi()
+    }
+
+    /// The crystal stops, or can oscillate again.
+    pub(crate) fn set_crystal(&mut self, oscillates: bool, now: u64) {
+        let at_s = self.seconds(now);
+        let result = self.rcc.set_crystal(oscillates, at_s).and_then(|failed| {
+            if failed {
+                // RM0440, 7.2.8: the failure is a system break of the advanced timers.
+                self.tim1.system_break();
+                self.tim1_changed(now);
+            }
+            self.check_clock(now)
+        });
+        if let Err(refusal) = result {
+            self.fail(BoardError::Part { part: "clock", at_s, reason: refusal.0 });
+        }
     }
 
     // ---- pins -------------------------------------------------------------------------------------------------

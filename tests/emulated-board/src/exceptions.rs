@@ -8,6 +8,7 @@ use unicorn_engine::{RegisterARM as R, Unicorn};
 use crate::cpu::{read_word, write_word};
 use crate::error::BoardError;
 use crate::machine::{Machine, Sleep};
+use crate::scs::NMI_PRIORITY;
 
 const ENTRY_CYCLES: u64 = 12;
 const RETURN_CYCLES: u64 = 10;
@@ -41,11 +42,11 @@ const FP: [R; 16] = [
 
 type Uc<'a> = Unicorn<'a, Machine>;
 
-/// Whether `priority` gets past PRIMASK, FAULTMASK and BASEPRI.
+/// Whether `priority` gets past PRIMASK, FAULTMASK and BASEPRI; that of the NMI always does.
 pub(crate) fn unmasked(uc: &Uc<'_>, priority: i16) -> Result<bool, BoardError> {
     let blocked = uc.reg_read(R::PRIMASK)? & 1 | uc.reg_read(R::FAULTMASK)? & 1;
     let base = i16::from(uc.reg_read(R::BASEPRI)? as u8);
-    Ok(blocked == 0 && (base == 0 || priority < base))
+    Ok(priority == NMI_PRIORITY || blocked == 0 && (base == 0 || priority < base))
 }
 
 /// Whether the core stands inside an IT block.

@@ -80,6 +80,8 @@ pub enum Injection {
     EncoderMagnetLost(EncoderAt),
     /// The bridge pulls its fault pin low.
     BridgeFault,
+    /// The crystal at HSE stops, or does not start.
+    Crystal,
     /// A cable loses pretension: what is left of it \[1\].
     Pretension(Cable, f64),
     /// The USB host neither writes nor reads.

@@ -202,6 +202,9 @@ impl Machine {
         if self.scs.raise(self.bus.lines()) {
             self.look = true;
         }
+        if self.bus.nmi() && self.scs.raise_nmi() {
+            self.look = true;
+        }
         self.next_event = self.bus.next_event().min(self.scs.next_event());
     }
 

@@ -228,6 +228,7 @@ impl Rig {
             }
             Injection::EncoderBus(_)
             | Injection::BridgeFault
+            | Injection::Crystal
             | Injection::HostSilent
             | Injection::HostNotReading => return false,
         }

@@ -4,6 +4,10 @@
 
 use crate::error::{Refusal, only};
 
+/// Exception number of the NMI.
+pub(crate) const NMI: u16 = 2;
+/// Its priority, which no mask keeps back.
+pub(crate) const NMI_PRIORITY: i16 = -2;
 /// Exception number of `HardFault`.
 pub(crate) const HARD_FAULT: u16 = 3;
 /// Exception number of `BusFault`.
@@ -111,6 +115,9 @@ impl Scs {
     ///
     /// Among equals the lowest exception number goes first.
     pub(crate) fn candidate(&self) -> Option<(u16, i16)> {
+        if self.system_pending >> NMI & 1 == 1 && self.running_priority() > NMI_PRIORITY {
+            return Some((NMI, NMI_PRIORITY));
+        }
         let mut best: Option<(u16, i16)> = None;
         let mut consider = |exception: u16, priority: u8| {
             let priority = i16::from(priority);
@@ -137,6 +144,16 @@ impl Scs {
         let new = lines & !self.active & !self.pending;
         self.pending |= new;
         new & self.enabled != 0
+    }
+
+    /// Pends the NMI unless it runs; true if that is new.
+    pub(crate) fn raise_nmi(&mut self) -> bool {
+        let new =
+            self.system_pending >> NMI & 1 == 0 && !self.stack.iter().any(|active| active.exception == NMI);
+        if new {
+            self.system_pending |= 1 << NMI;
+        }
+        new
     }
 
     /// Priority of the handler that SHCSR enables for the fault `exception`.
@@ -263,6 +280,7 @@ impl Scs {
             | u32::from(interrupts != 0) << 22
             | u32::from(self.system_pending >> SYS_TICK & 1) << 26
             | u32::from(self.system_pending >> PEND_SV & 1) << 28
+            | u32::from(self.system_pending >> NMI & 1) << 31
     }
 
     /// Writes `size` bytes of `value` to the register at `offset` from 0xE0000000.

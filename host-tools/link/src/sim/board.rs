@@ -10,7 +10,7 @@ use bowden_control::snapshot::Snapshot;
 use bowden_control::tick::{Command, Queues};
 use bowden_control::tick_config;
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
-use bowden_link::message::{Boot, Provocation};
+use bowden_link::message::{Boot, Chip, Provocation};
 use bowden_link::{Answer, Fault, FromBoard, Request, Sample, State};
 use virtual_bench::BenchError;
 
@@ -101,8 +101,12 @@ impl SimBoard {
     pub(super) fn new(concealed: &Concealed) -> Result<Self, BenchError> {
         let parameters = Parameters::default();
         let config = tick_config(&parameters).expect("default parameters fit together");
-        let identity =
-            Identity { firmware: env!("CARGO_PKG_VERSION"), board: "simulated", boot: Boot::Power };
+        let identity = Identity {
+            firmware: env!("CARGO_PKG_VERSION"),
+            board: "simulated",
+            boot: Boot::Power,
+            chip: Chip::EXPECTED,
+        };
         let joint = SimJoint::new(&parameters, concealed)?;
         Ok(Self {
             controller: Controller::new(config),

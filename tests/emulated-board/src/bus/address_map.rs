@@ -2,7 +2,6 @@
 
 use super::{Bus, PORTS, TIMERS};
 use crate::error::Refusal;
-use crate::peripherals::NEVER;
 use crate::peripherals::adc::{Adc, Common};
 use crate::peripherals::crs::Crs;
 use crate::peripherals::dmamux::Dmamux;
@@ -15,8 +14,6 @@ use crate::trace::Kind;
 const PORT_NAMES: [&str; PORTS] = ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"];
 /// Highest clock of an ADC \[Hz\].
 const ADC_HIGHEST_HZ: f64 = 60.0e6;
-/// Cycles that the clock may be fast before boost mode is on: 100 us at 170 MHz.
-const BOOST_GRACE_CYCLES: u64 = 17_000;
 /// A peripheral of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Unit {
@@ -126,7 +123,7 @@ impl Bus {
             Unit::Tim1 => self.tim1.read(offset, now),
             Unit::Dma(controller) => self.dma.read(controller, offset),
             Unit::Dmamux => self.dmamux.read(offset),
-            Unit::Rcc => self.rcc.read(offset),
+            Unit::Rcc => self.rcc.read(offset, self.clock.seconds(now)),
             Unit::Flash => self.flash.read(offset),
             Unit::Gpio(port) => self.gpio[port].read(offset),
             Unit::Adc => match offset >> 8 {
@@ -197,7 +194,7 @@ impl Bus {
             Unit::Dma(controller) => self.dma.write(controller, offset, value),
             Unit::Dmamux => self.dmamux.write(offset, value),
             Unit::Rcc => {
-                self.rcc.write(offset, value)?;
+                self.rcc.write(offset, value, self.clock.seconds(now))?;
                 for (bank, bit) in self.rcc.take_resets() {
                     self.reset_unit(bank, bit, now);
                 }
@@ -240,16 +237,17 @@ impl Bus {
         }
     }
 
-    /// Follows a new frequency of HCLK and checks that the flash keeps up.
-    fn check_clock(&mut self, now: u64) -> Result<(), Refusal> {
+    /// Follows a new frequency of HCLK and checks that core supply and flash keep up.
+    pub(super) fn check_clock(&mut self, now: u64) -> Result<(), Refusal> {
         let hz = self.rcc.hclk_hz();
         self.clock.set_hz(now, hz);
-        self.boost_deadline = if self.rcc.needs_boost() && !self.pwr.boost() {
-            self.boost_deadline.min(now + BOOST_GRACE_CYCLES)
-        } else {
-            NEVER
-        };
-        if self.flash.latency_suffices(hz) {
+        if self.rcc.needs_boost() && !self.pwr.boost() {
+            let got = self.rcc.sysclk_hz();
+            return Err(Refusal::because(format!(
+                "SYSCLK of {got} Hz without boost mode (PWR_CR5 bit 8, R1MODE, is set), expected at most 150 MHz"
+            )));
+        }
+        if self.flash.latency_suffices(hz, self.pwr.boost()) {
             return Ok(());
         }
         let states = self.flash.wait_states();

@@ -18,6 +18,7 @@ const BREAK_POLARITY_HIGH: u32 = 1 << 13;
 const BREAK_ENABLE: u32 = 1 << 12;
 const UPDATE_FLAG: u32 = 1;
 const BREAK_FLAG: u32 = 1 << 7;
+const SYSTEM_BREAK_FLAG: u32 = 1 << 13;
 
 /// What the pair of outputs of one channel does to a half bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -191,6 +192,14 @@ impl AdvancedTimer {
         }
     }
 
+    /// A system break: failure of the clock, lockup and their like (RM0440, TIM1 break function).
+    pub(crate) fn system_break(&mut self) {
+        if self.bdtr & BREAK_ENABLE != 0 {
+            self.bdtr &= !MAIN_OUTPUT_ENABLE;
+            self.sr |= SYSTEM_BREAK_FLAG;
+        }
+    }
+
     /// Level at the BKIN pin changed.
     pub(crate) fn set_break_pin(&mut self, level: bool) {
         self.break_pin = level;
@@ -199,7 +208,7 @@ impl AdvancedTimer {
 
     /// Whether the line of break (`TIM1_BRK_TIM15`) is high.
     pub(crate) fn break_line(&self) -> bool {
-        self.sr & self.dier & BREAK_FLAG != 0
+        self.sr & (BREAK_FLAG | SYSTEM_BREAK_FLAG) != 0 && self.dier & BREAK_FLAG != 0
     }
 
     /// Whether the line of update (`TIM1_UP_TIM16`) is high.

@@ -13,8 +13,8 @@ pub(crate) const PAGE_BYTES: usize = 2048;
 const PROGRAM_S: f64 = 81.69e-6;
 /// Time to erase a page \[s\].
 const ERASE_S: f64 = 22.02e-3;
-/// HCLK that each wait state allows in boost mode \[Hz\].
-const HZ_PER_WAIT_STATE: u64 = 34_000_000;
+/// HCLK that each wait state allows in range 1, in normal and in boost mode \[Hz\] (RM0440, 5.3.3).
+const HZ_PER_WAIT_STATE: [u64; 2] = [30_000_000, 34_000_000];
 
 const BUSY: u32 = 1 << 16;
 const END_OF_OPERATION: u32 = 1;
@@ -127,10 +127,8 @@ impl Flash {
     }
 
     /// Whether the wait states suffice for `hclk_hz`.
-    ///
-    /// Checked with the limits of boost mode, the more permissive ones.
-    pub(crate) fn latency_suffices(&self, hclk_hz: u64) -> bool {
-        hclk_hz <= HZ_PER_WAIT_STATE * (u64::from(self.acr & 0xf) + 1)
+    pub(crate) fn latency_suffices(&self, hclk_hz: u64, boost: bool) -> bool {
+        hclk_hz <= HZ_PER_WAIT_STATE[usize::from(boost)] * (u64::from(self.acr & 0xf) + 1)
     }
 
     /// Wait states set.
@@ -452,11 +450,12 @@ mod tests {
     }
 
     #[test]
-    fn four_wait_states_carry_170_mhz() {
+    fn four_wait_states_carry_170_mhz_in_boost_mode_only() {
         let mut flash = Flash::new();
-        assert!(flash.latency_suffices(16_000_000));
-        assert!(!flash.latency_suffices(170_000_000));
+        assert!(flash.latency_suffices(16_000_000, false));
+        assert!(!flash.latency_suffices(170_000_000, true));
         flash.write(0x00, 0x0004_0604, 0, HZ).expect("ACR");
-        assert!(flash.latency_suffices(170_000_000));
+        assert!(flash.latency_suffices(170_000_000, true));
+        assert!(!flash.latency_suffices(170_000_000, false) && flash.latency_suffices(150_000_000, false));
     }
 }

@@ -49,9 +49,8 @@ impl Pwr {
             }
             0x18 => {}
             0x80 => {
-                // Reserved bit 0 is let through as zero: some register descriptions have R1MODE there instead of bit 8.
-                only("CR5", value, 0x101)?;
-                self.cr5 = value & 0x100;
+                only("CR5", value, 0x100)?;
+                self.cr5 = value;
             }
             _ => return Err(Refusal::no_register(offset)),
         }

@@ -1,6 +1,6 @@
 //! The bridge's fault line acts in hardware: no instruction of the firmware is needed.
 
-use bowden_board::Injection;
+use bowden_board::{Injection, TICK_MARKER};
 use bowden_link::Fault;
 use bowden_on_board_tests::Outcome;
 
@@ -9,6 +9,10 @@ use crate::stop::{checked, moving};
 #[test]
 fn the_break_input_opens_the_bridge_while_the_core_stands() -> Outcome {
     let mut host = moving()?;
+    // Between two ticks: a tick that is held half done is a late one.
+    while host.board.output(TICK_MARKER) == Some(true) {
+        host.pass(1e-6)?;
+    }
     host.board.halt_core(true);
     host.board.run_for(1e-3)?;
     assert!(host.board.pwm().duty.is_some(), "without a core the bridge goes on with its last duty");

@@ -3,10 +3,11 @@
 use bowden_link::Fault;
 
 /// Sources of the tests that provoke faults.
-const SOURCES: [&str; 4] = [
+const SOURCES: [&str; 5] = [
     include_str!("faults.rs"),
     include_str!("failures.rs"),
     include_str!("parameters.rs"),
+    include_str!("clock.rs"),
     include_str!("ripple_table.rs"),
 ];
 
@@ -33,6 +34,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::Watchdog => "a_hang_ends_with_the_watchdog_and_the_motor_is_off_long_before",
         Fault::Panic => "a_panic_stops_the_motor_and_leaves_its_words",
         Fault::HardFault => "a_processor_fault_stops_the_motor_and_says_where",
+        Fault::ClockFailed => "a_crystal_that_stops_opens_the_bridge_at_once_and_is_a_named_fault",
         Fault::SelfTestTimeout => "a_restless_sensor_ends_the_self_test",
         Fault::PretensionOff => "lost_pretension_is_found_before_the_bridge_is_on",
         Fault::HomingTimeout => "homing_that_does_not_arrive_ends",

@@ -2,6 +2,7 @@
 
 mod boot;
 mod bridge;
+mod clock;
 mod closed_loop;
 mod conformance;
 mod corrections;
