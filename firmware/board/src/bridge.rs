@@ -1,25 +1,30 @@
 //! The motor bridge: TIM1 with two complementary pairs, break input, enable pin.
 //!
 //! Duty d from -1 to 1 gives leg A the duty (1 + d)/2 and leg B (1 - d)/2, so the motor sees d times the bus voltage.
-//! The fault line of the bridge leads to the break input: hardware takes all four outputs low, with no clock and no
-//! software needed, and only the next start puts them back.
+//! The fault line of the bridge leads to the break input: hardware takes all four outputs low and keeps them there, with no clock
+//! and no software needed, and only the next start puts them back. The same do a clock that fails, a core that locks up, a supply
+//! that falls and flash or RAM that is damaged, and a debugger that holds the core.
+//!
+//! What decides over the outputs is locked until the next reset. The lock can be written with the first write to BDTR only, which
+//! the HAL's driver makes, so the timer is set up here and the HAL does the pins.
+
+use core::mem::forget;
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::pac;
 use embassy_stm32::pac::gpio::vals::Moder;
+use embassy_stm32::pac::timer::vals::{Bkp, Cms, FilterValue, Lock, Mms2, Ocm, Ossi, Ossr};
 use embassy_stm32::peripherals::{PA8, PA9, PB12, PB13, PB14, PC6, TIM1};
-use embassy_stm32::time::khz;
-use embassy_stm32::timer::Channel;
-use embassy_stm32::timer::complementary_pwm::{ComplementaryPwm, ComplementaryPwmPin, Mms2};
-use embassy_stm32::timer::low_level::BreakInputPolarity;
-use embassy_stm32::timer::low_level::CountingMode;
+use embassy_stm32::rcc;
+use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::simple_pwm::PwmPin;
+use embassy_stm32::timer::{Ch1, Ch2};
 
-/// PWM periods a second, Hz.
-pub const PWM_KHZ: u32 = 20;
+type High<C> = PwmPin<'static, TIM1, C>;
+type Low<C> = ComplementaryPwmPin<'static, TIM1, C>;
 
-/// Counts of half a PWM period: 170 MHz / 20 kHz / 2. The HAL would take one less.
+/// Counts of half a PWM period: 170 MHz / 20 kHz / 2.
 const RELOAD: u16 = 4_250;
 
 /// Compare value of duty 0.
@@ -29,19 +34,22 @@ const HALF_PERIOD: i32 = RELOAD as i32 / 2;
 const BREAK_FUNCTION: u8 = 6;
 
 /// Dead time in steps of 5.9 ns: 353 ns, three times what the bridge in the parts list needs.
-const DEAD_TIME: u16 = 60;
+const DEAD_TIME: u8 = 60;
+
+/// Eight samples of 170 MHz / 8: what switching couples into the fault line is shorter than these 0.38 us, and a short circuit
+/// gets dangerous in microseconds.
+const BREAK_FILTER: FilterValue = FilterValue::FDTS_DIV8_N8;
 
 /// The bridge, off after [`Self::new`].
 pub struct Bridge {
-    pwm: ComplementaryPwm<'static, TIM1>,
     enable: Output<'static>,
     on: bool,
 }
 
 impl Bridge {
-    /// Sets the timer up with `divider` PWM periods a control tick, outputs off.
+    /// Sets the timer up with `divider` PWM periods a control tick, outputs low, and locks it.
     pub fn new(
-        timer: Peri<'static, TIM1>,
+        _timer: Peri<'static, TIM1>,
         leg_a: (Peri<'static, PA8>, Peri<'static, PB13>),
         leg_b: (Peri<'static, PA9>, Peri<'static, PB14>),
         fault: Peri<'static, PB12>,
@@ -49,32 +57,44 @@ impl Bridge {
         divider: u16,
     ) -> Self {
         let enable = Output::new(enable, Level::Low, Speed::Low);
-        let push_pull = OutputType::PushPull;
-        let mut pwm = ComplementaryPwm::new(
-            timer,
-            Some(PwmPin::new(leg_a.0, push_pull)),
-            Some(ComplementaryPwmPin::new(leg_a.1, push_pull)),
-            Some(PwmPin::new(leg_b.0, push_pull)),
-            Some(ComplementaryPwmPin::new(leg_b.1, push_pull)),
-            None,
-            None,
-            None,
-            None,
-            khz(PWM_KHZ),
-            CountingMode::CenterAlignedBothInterrupts,
-        );
-        pwm.set_master_output_enable(false);
-        pwm.set_automatic_output_enable(false);
-        pwm.set_dead_time(DEAD_TIME);
+        break_by_system();
+        rcc::enable_and_reset::<TIM1>();
+        let timer = pac::TIM1;
+        // A debugger that holds the core stops the counter, and the outputs go low.
+        pac::DBGMCU.apb2fzr().modify(|freeze| freeze.set_tim1(true));
+        timer.cr1().write(|control| {
+            control.set_cms(Cms::CENTER_ALIGNED3);
+            control.set_arpe(true);
+        });
+        timer.cr2().write(|control| control.set_mms2(Mms2::UPDATE));
+        timer.ccmr_output(0).write(|compare| {
+            for channel in 0..2 {
+                compare.set_ocm(channel, Ocm::PWM_MODE1);
+                compare.set_ocpe(channel, true);
+            }
+        });
+        timer.ccer().write(|outputs| {
+            for channel in 0..2 {
+                outputs.set_cce(channel, true);
+                outputs.set_ccne(channel, true);
+            }
+        });
         connect_fault_line(fault);
-        pwm.set_break_polarity(BreakInputPolarity::ACTIVE_LOW);
-        pwm.set_break_input_pin_enable(true);
-        pwm.set_break_enable(true);
-        pwm.enable(Channel::Ch1);
-        pwm.enable(Channel::Ch2);
-        pwm.set_mms2(Mms2::UPDATE);
+        timer.bdtr().write(|protection| {
+            protection.set_dtg(DEAD_TIME);
+            protection.set_ossi(Ossi::IDLE_LEVEL);
+            protection.set_ossr(Ossr::IDLE_LEVEL);
+            protection.set_bke(0, true);
+            protection.set_bkp(0, Bkp::ACTIVE_LOW);
+            protection.set_bkf(0, BREAK_FILTER);
+            protection.set_lock(Lock::LEVEL3);
+        });
+        // Kept as they are: the pins have no other use until reset.
+        let kind = OutputType::PushPull;
+        forget((High::<Ch1>::new(leg_a.0, kind), Low::<Ch1>::new(leg_a.1, kind)));
+        forget((High::<Ch2>::new(leg_b.0, kind), Low::<Ch2>::new(leg_b.1, kind)));
         restart(divider);
-        Self { pwm, enable, on: false }
+        Self { enable, on: false }
     }
 
     /// Whether the bridge reports a fault, or has since it was switched on.
@@ -87,8 +107,8 @@ impl Bridge {
     /// Duty of the coming PWM period and on or off; off acts at once.
     pub fn set(&mut self, duty_raw: i16, on: bool) {
         let offset = (HALF_PERIOD * i32::from(duty_raw)) >> 15;
-        self.pwm.set_duty(Channel::Ch1, (HALF_PERIOD + offset) as u32);
-        self.pwm.set_duty(Channel::Ch2, (HALF_PERIOD - offset) as u32);
+        pac::TIM1.ccr(0).write(|compare| compare.set_ccr((HALF_PERIOD + offset) as u16));
+        pac::TIM1.ccr(1).write(|compare| compare.set_ccr((HALF_PERIOD - offset) as u16));
         if !on {
             // While the fault line is low the flag comes back at once.
             pac::TIM1.sr().modify(|status| {
@@ -98,7 +118,7 @@ impl Bridge {
         }
         if on != self.on {
             self.on = on;
-            self.pwm.set_master_output_enable(on);
+            pac::TIM1.bdtr().modify(|protection| protection.set_moe(on));
             self.enable.set_level(on.into());
         }
     }
@@ -113,9 +133,19 @@ impl Bridge {
 /// Pulled up, active low, led to `TIM1_BKIN`; the HAL has no way to keep a break input and five more pins.
 fn connect_fault_line(fault: Peri<'static, PB12>) {
     // Configures the pull-up and is kept as it is: the pin has no other use until reset.
-    core::mem::forget(Input::new(fault, Pull::Up));
+    forget(Input::new(fault, Pull::Up));
     pac::GPIOB.afr(1).modify(|functions| functions.set_afr(12 - 8, BREAK_FUNCTION));
     pac::GPIOB.moder().modify(|modes| modes.set_moder(12, Moder::ALTERNATE));
+}
+
+/// What the processor itself finds breaks too: lockup, PVD, parity of the RAM, two wrong bits of the flash (RM0440, `SYSCFG_CFGR2`).
+fn break_by_system() {
+    pac::SYSCFG.cfgr2().modify(|breaks| {
+        breaks.set_cll(true);
+        breaks.set_spl(true);
+        breaks.set_pvdl(true);
+        breaks.set_eccl(true);
+    });
 }
 
 /// Sets period and repetition while the counter stands, so that every update falls on the middle of the low phase

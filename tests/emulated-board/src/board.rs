@@ -114,8 +114,12 @@ pub struct PwmState {
     pub reload: u32,
     /// Dead time generator setting.
     pub dead_time_raw: u8,
-    /// Fraction of the time that the high switch of leg A and B is on; `None` for a leg that floats.
+    /// Lock level of the timer's protection, 0 to 3.
+    pub lock_level: u8,
+    /// Fraction of the time that the high switch of leg A and B is on; `None` for a leg that is off.
     pub legs: [Option<f64>; 2],
+    /// Whether the timer drives both gates of leg A and B; else pull-downs keep them off.
+    pub driven: [bool; 2],
 }
 
 /// Timing of the control tick by the edges of its marker pin.
@@ -312,8 +316,8 @@ impl Board {
     pub fn pwm(&self) -> PwmState {
         let bus = self.bus();
         let leg = |index| match bus.leg(index) {
-            Leg::Off => None,
-            Leg::Switching(high) => Some(high),
+            Leg::Switching(high) if bus.bridge_enabled() => Some(high),
+            _ => None,
         };
         let first_two = |values: [u32; 6]| [values[0], values[1]];
         PwmState {
@@ -327,7 +331,9 @@ impl Board {
             compare_written: first_two(bus.tim1.compare()),
             reload: bus.tim1.reload_active(),
             dead_time_raw: bus.tim1.dead_time_raw(),
+            lock_level: bus.tim1.lock_level() as u8,
             legs: [leg(0), leg(1)],
+            driven: [0, 1].map(|index| bus.leg(index) != Leg::Floating),
         }
     }
 
@@ -439,9 +445,20 @@ impl Board {
         machine.refresh();
     }
 
-    /// Holds the core as a debugger does, or lets it go on; timers, converters, DMA and watchdog run meanwhile.
+    /// Holds the core as a debugger does, or lets it go on; TIM1 stands meanwhile if `DBG_TIM1_STOP` is set, and other timers,
+    /// converters, DMA and watchdog run.
     pub fn halt_core(&mut self, halt: bool) {
-        self.cpu.machine_mut().halted = halt;
+        let machine = self.cpu.machine_mut();
+        machine.halted = halt;
+        let now = machine.cycle;
+        machine.bus.debugger_holds(halt, now);
+        machine.refresh();
+    }
+
+    /// Stops the core between two instructions, or lets it go on, unseen by everything else: it executes nothing, as if it waited
+    /// for a bus.
+    pub fn stall_core(&mut self, stall: bool) {
+        self.cpu.machine_mut().halted = stall;
     }
 
     /// Lets faults of the core reach the firmware's handlers instead of ending the run: undefined instructions, accesses

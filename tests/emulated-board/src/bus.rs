@@ -195,6 +195,7 @@ impl Bus {
         let timers = self.timers.iter().map(Timer::next_event).min().unwrap_or(NEVER);
         timers
             .min(self.tim1.next_event())
+            .min(self.tim1.break_event())
             .min(self.adc[0].next_event())
             .min(self.adc[1].next_event())
             .min(self.spi[0].next_event())
@@ -213,6 +214,10 @@ impl Bus {
         }
         if self.tim1.next_event() <= at {
             self.tim1.advance(at);
+            self.tim1_changed(at);
+        }
+        if self.tim1.break_event() <= at {
+            self.tim1.pass_break();
             self.tim1_changed(at);
         }
         for index in 0..2 {
@@ -404,13 +409,13 @@ impl Bus {
                 }
             }
         }
-        self.update_break_pin();
+        self.update_break_pin(now);
         self.bridge_changed(now);
     }
 
-    fn update_break_pin(&mut self) {
+    fn update_break_pin(&mut self, now: u64) {
         let connected = self.pin_mode(wiring::BRIDGE_FAULT) == Mode::Alternate(wiring::BRIDGE_ALTERNATE);
-        self.tim1.set_break_pin(!(connected && self.bridge_fault));
+        self.tim1.set_break_pin(!(connected && self.bridge_fault), now);
     }
 
     fn drive_fault_pin(&mut self, now: u64) {
@@ -420,7 +425,7 @@ impl Bus {
         if self.syscfg.exti_port(pin.number) == pin.port_index() && now > 0 {
             self.exti.edge(pin.number, level);
         }
-        self.update_break_pin();
+        self.update_break_pin(now);
         self.bridge_changed(now);
     }
 
@@ -437,7 +442,7 @@ impl Bus {
         let connected = wiring::BRIDGE_LEGS[index]
             .iter()
             .all(|pin| self.pin_mode(*pin) == Mode::Alternate(wiring::BRIDGE_ALTERNATE));
-        if connected && self.bridge_enabled() { self.tim1.leg(index) } else { Leg::Off }
+        if connected { self.tim1.leg(index) } else { Leg::Floating }
     }
 
     /// Whether the enable pin of the bridge is high.
@@ -446,8 +451,10 @@ impl Bus {
     }
 
     fn bridge_changed(&mut self, now: u64) {
+        // The driver pulls floating inputs down, and does not listen to them while it is not enabled.
+        let switches = |leg| matches!(leg, Leg::Switching(_)) && self.bridge_enabled();
         let legs = [self.leg(0), self.leg(1)];
-        if legs != [Leg::Off; 2] && self.tim1.dead_time_raw() == 0 {
+        if legs.into_iter().any(switches) && self.tim1.dead_time_raw() == 0 {
             self.fail(BoardError::Part {
                 part: "bridge",
                 at_s: self.seconds(now),
@@ -456,11 +463,17 @@ impl Bus {
         }
         // One leg alone carries no current.
         let bridge = match legs {
-            [Leg::Switching(a), Leg::Switching(b)] => Bridge::Duty(a - b),
+            [Leg::Switching(a), Leg::Switching(b)] if self.bridge_enabled() => Bridge::Duty(a - b),
             _ => Bridge::Open,
         };
         let now_s = self.seconds(now);
         self.rig.set_bridge(now_s, bridge);
+    }
+
+    /// A debugger holds the core, or lets it go on.
+    pub(crate) fn debugger_holds(&mut self, holds: bool, now: u64) {
+        self.tim1.freeze(holds && self.dbgmcu.stops_tim1(), now);
+        self.bridge_changed(now);
     }
 
     fn tim1_changed(&mut self, now: u64) {

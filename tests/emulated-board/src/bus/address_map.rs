@@ -267,7 +267,7 @@ impl Bus {
             (Bank::Apb2, 0) => self.syscfg = Syscfg::new(),
             (Bank::Apb2, 11) => {
                 self.tim1.reset();
-                self.update_break_pin();
+                self.update_break_pin(now);
                 self.bridge_changed(now);
             }
             (Bank::Apb2, 12) => self.spi[0].reset(),

@@ -2,8 +2,10 @@
 //! (RM0440, TIM1/TIM8/TIM20).
 //!
 //! Outputs are described by their mean over a period; dead time is kept and read back, its effect on the mean left
-//! aside. Not modelled: down counting, input capture, slave modes, DMA, dithering, BKIN2, bidirectional break, filters,
-//! compare flags and their interrupts. The interrupts are those of break and update.
+//! aside. Behind a break, and while a debugger freezes the timer, OSSI says whether the outputs are driven low or float; OSSR does
+//! so for one output of a pair that is off (RM0440, TIM1, output control bits). The break filter delays either edge; LOCK is written
+//! once and protects until the next reset. Not modelled: down counting, input capture, slave modes, DMA, dithering, BKIN2,
+//! bidirectional break, input filters, compare flags and their interrupts. The interrupts are those of break and update.
 
 use super::NEVER;
 use crate::error::{Refusal, only};
@@ -13,6 +15,30 @@ const UPDATE_DISABLE: u32 = 1 << 1;
 const UPDATE_REQUEST_SOURCE: u32 = 1 << 2;
 const AUTO_RELOAD_PRELOAD: u32 = 1 << 7;
 const MAIN_OUTPUT_ENABLE: u32 = 1 << 15;
+const OFF_STATE_RUN: u32 = 1 << 11;
+const OFF_STATE_IDLE: u32 = 1 << 10;
+const LOCK: u32 = 3 << 8;
+/// Bits of BDTR that lock levels 1 and 2 protect (RM0440, `TIM1_BDTR`): DTG, BKE, BKP, AOE, BKF; OSSI and OSSR too.
+const LOCKED_BDTR: [u32; 2] = [0x000f_70ff, 0x000f_7cff];
+/// Cycles between two samples of the break filter and samples that it wants, by BKF (RM0440, `TIM1_BDTR`; CKD 0).
+const BREAK_FILTER: [(u64, u64); 16] = [
+    (0, 0),
+    (1, 2),
+    (1, 4),
+    (1, 8),
+    (2, 6),
+    (2, 8),
+    (4, 6),
+    (4, 8),
+    (8, 6),
+    (8, 8),
+    (16, 5),
+    (16, 6),
+    (16, 8),
+    (32, 5),
+    (32, 6),
+    (32, 8),
+];
 const AUTOMATIC_OUTPUT_ENABLE: u32 = 1 << 14;
 const BREAK_POLARITY_HIGH: u32 = 1 << 13;
 const BREAK_ENABLE: u32 = 1 << 12;
@@ -23,13 +49,16 @@ const SYSTEM_BREAK_FLAG: u32 = 1 << 13;
 /// What the pair of outputs of one channel does to a half bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Leg {
-    /// Both switches are off.
+    /// Both gates are driven low.
     Off,
+    /// The timer drives neither gate: what they see is up to pull-downs.
+    Floating,
     /// The high side is on for this fraction of the time, the low side for the rest.
     Switching(f64),
 }
 
 /// TIM1.
+#[expect(clippy::struct_excessive_bools, reason = "independent levels and marks, no state machine")]
 #[derive(Debug, Clone)]
 pub(crate) struct AdvancedTimer {
     cr1: u32,
@@ -48,8 +77,16 @@ pub(crate) struct AdvancedTimer {
     compare_active: [u32; CHANNELS],
     bdtr: u32,
     af1: u32,
+    /// BDTR was written: LOCK is what it is until the next reset.
+    lock_is_set: bool,
     /// Level at the BKIN pin.
     break_pin: bool,
+    /// Level behind the break filter: active.
+    break_seen: bool,
+    /// Cycle at which the filter passes the pin's level on, if that is another one.
+    break_change: u64,
+    /// Cycle at which a debugger froze the counter.
+    frozen_since: Option<u64>,
     /// Cycle at which the present half period (up counting: period) began.
     half_start: u64,
     /// The present half counts down.
@@ -82,7 +119,11 @@ impl AdvancedTimer {
             compare_active: [0; CHANNELS],
             bdtr: 0,
             af1: 1,
+            lock_is_set: false,
             break_pin: true,
+            break_seen: false,
+            break_change: NEVER,
+            frozen_since: None,
             half_start: 0,
             down: false,
             stopped_count: 0,
@@ -93,7 +134,7 @@ impl AdvancedTimer {
 
     /// Back to the reset state; the level at BKIN stays.
     pub(crate) fn reset(&mut self) {
-        *self = Self { break_pin: self.break_pin, ..Self::new() };
+        *self = Self { break_pin: self.break_pin, frozen_since: self.frozen_since, ..Self::new() };
     }
 
     fn runs(&self) -> bool {
@@ -122,6 +163,7 @@ impl AdvancedTimer {
         if !self.runs() {
             return (self.stopped_count, self.down);
         }
+        let now = self.frozen_since.unwrap_or(now);
         let counts = now.saturating_sub(self.half_start) / self.cycles_per_count();
         let (halves, inside) = (counts / self.half_counts().max(1), counts % self.half_counts().max(1));
         let down = self.centre_aligned() && (self.down ^ (halves & 1 == 1));
@@ -131,7 +173,7 @@ impl AdvancedTimer {
 
     /// Cycle of the next update event, [`NEVER`] while the counter stands.
     pub(crate) fn next_event(&self) -> u64 {
-        if !self.runs() || self.reload_active == 0 {
+        if !self.runs() || self.reload_active == 0 || self.frozen_since.is_some() {
             return NEVER;
         }
         self.half_start + self.half_cycles() * (u64::from(self.repetition_left) + 1)
@@ -178,11 +220,53 @@ impl AdvancedTimer {
         std::mem::take(&mut self.triggers)
     }
 
+    /// A debugger holds the core with `DBG_TIM1_STOP` set, or lets it go on.
+    pub(crate) fn freeze(&mut self, frozen: bool, now: u64) {
+        match (self.frozen_since, frozen) {
+            (None, true) => self.frozen_since = Some(now),
+            (Some(since), false) => {
+                self.half_start += now - since;
+                self.frozen_since = None;
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether the pin in front of the break filter is active.
+    fn break_wanted(&self) -> bool {
+        let pin = if self.af1 >> 9 & 1 == 1 { !self.break_pin } else { self.break_pin };
+        self.af1 & 1 != 0 && pin == (self.bdtr & BREAK_POLARITY_HIGH != 0)
+    }
+
     /// Whether the break function sees an active input.
     fn break_input(&self) -> bool {
-        let pin = if self.af1 >> 9 & 1 == 1 { !self.break_pin } else { self.break_pin };
-        let active = pin == (self.bdtr & BREAK_POLARITY_HIGH != 0);
-        self.bdtr & BREAK_ENABLE != 0 && self.af1 & 1 != 0 && active
+        self.bdtr & BREAK_ENABLE != 0 && self.break_seen
+    }
+
+    /// Follows the pin through the break filter.
+    fn follow_break(&mut self, now: u64) {
+        let (between, samples) = BREAK_FILTER[(self.bdtr >> 16 & 0xf) as usize];
+        if self.break_wanted() == self.break_seen {
+            self.break_change = NEVER;
+        } else if samples == 0 {
+            self.break_seen = !self.break_seen;
+            self.break_change = NEVER;
+        } else if self.break_change == NEVER {
+            self.break_change = now + between * samples;
+        }
+        self.apply_break();
+    }
+
+    /// Cycle at which the break filter passes another level on.
+    pub(crate) fn break_event(&self) -> u64 {
+        self.break_change
+    }
+
+    /// The filter passes the pin's level on.
+    pub(crate) fn pass_break(&mut self) {
+        self.break_change = NEVER;
+        self.break_seen = self.break_wanted();
+        self.apply_break();
     }
 
     fn apply_break(&mut self) {
@@ -201,9 +285,9 @@ impl AdvancedTimer {
     }
 
     /// Level at the BKIN pin changed.
-    pub(crate) fn set_break_pin(&mut self, level: bool) {
+    pub(crate) fn set_break_pin(&mut self, level: bool, now: u64) {
         self.break_pin = level;
-        self.apply_break();
+        self.follow_break(now);
     }
 
     /// Whether the line of break (`TIM1_BRK_TIM15`) is high.
@@ -216,9 +300,9 @@ impl AdvancedTimer {
         self.sr & self.dier & UPDATE_FLAG != 0
     }
 
-    /// Whether the main output enable is set.
+    /// Whether the main output enable is set and no debugger has frozen the timer, which acts like a cleared one.
     pub(crate) fn main_output(&self) -> bool {
-        self.bdtr & MAIN_OUTPUT_ENABLE != 0
+        self.bdtr & MAIN_OUTPUT_ENABLE != 0 && self.frozen_since.is_none()
     }
 
     /// Compare registers as the firmware wrote them.
@@ -267,8 +351,13 @@ impl AdvancedTimer {
     pub(crate) fn leg(&self, channel: usize) -> Leg {
         let bits = self.ccer >> (4 * channel);
         let (high, low) = (bits & 1 != 0, bits & 4 != 0);
-        if !(self.main_output() && high && low) {
-            return Leg::Off;
+        if !self.main_output() {
+            let driven = self.bdtr & OFF_STATE_IDLE != 0 && high && low;
+            return if driven { Leg::Off } else { Leg::Floating };
+        }
+        if !(high && low) {
+            let driven = self.bdtr & OFF_STATE_RUN != 0 && (high || low);
+            return if driven { Leg::Off } else { Leg::Floating };
         }
         let reference = self.reference_high(channel);
         Leg::Switching(if bits & 2 != 0 { 1.0 - reference } else { reference })
@@ -333,15 +422,23 @@ impl AdvancedTimer {
         Ok(())
     }
 
-    fn write_bdtr(&mut self, value: u32) -> Result<(), Refusal> {
+    /// Lock level, 0 to 3.
+    pub(crate) fn lock_level(&self) -> u32 {
+        self.bdtr >> 8 & 3
+    }
+
+    fn write_bdtr(&mut self, value: u32, now: u64) -> Result<(), Refusal> {
         only("BDTR", value, 0x000f_ffff)?;
-        if value >> 16 & 0xf != 0 {
-            return Err(Refusal::because("BDTR: the break filter BKF is not modelled"));
-        }
-        // Lock level 1 or more protects DTG, BKE, BKP and AOE until the next reset.
-        let locked = if self.bdtr & 0x300 == 0 { 0 } else { 0x73ff };
+        let protected = match self.lock_level() {
+            0 => 0,
+            1 => LOCKED_BDTR[0],
+            _ => LOCKED_BDTR[1],
+        };
+        // LOCK is frozen by the first write behind a reset, whatever it was.
+        let locked = protected | if self.lock_is_set { LOCK } else { 0 };
+        self.lock_is_set = true;
         self.bdtr = self.bdtr & locked | value & !locked;
-        self.apply_break();
+        self.follow_break(now);
         Ok(())
     }
 
@@ -355,7 +452,7 @@ impl AdvancedTimer {
                 if value >> 20 & 0xf != 0 && value >> 20 & 0xf != 2 {
                     return Err(Refusal::because("CR2: of MMS2 only reset (0) and update (2) are modelled"));
                 }
-                if value & 0x3f00 != 0 {
+                if value & 0x3f00 != 0 && self.lock_level() == 0 {
                     return Err(Refusal::because("CR2: idle states (OIS) that switch a transistor on"));
                 }
                 if value >> 4 & 7 != 0 {
@@ -396,14 +493,18 @@ impl AdvancedTimer {
                     return Err(Refusal::because("CCMR: fast and clear of a compare are not modelled"));
                 }
                 let register = if offset == 0x50 { 2 } else { (offset as usize - 0x18) / 4 };
-                self.ccmr[register] = value;
+                // Lock level 3 protects OCxM and OCxPE.
+                let locked = if self.lock_level() == 3 { 0x0101_7878 } else { 0 };
+                self.ccmr[register] = self.ccmr[register] & locked | value & !locked;
                 for channel in [2 * register, 2 * register + 1] {
                     self.set_compare(channel, self.compare[channel]);
                 }
             }
             0x20 => {
                 only("CCER", value, 0x0033_ffff)?;
-                self.ccer = value;
+                // Lock level 2 protects the polarities.
+                let locked = if self.lock_level() >= 2 { 0x0022_aaaa } else { 0 };
+                self.ccer = self.ccer & locked | value & !locked;
             }
             0x24 if !self.runs() => self.stopped_count = value & 0xffff,
             0x24 => return Err(Refusal::because("CNT must not be written while the counter runs")),
@@ -419,15 +520,17 @@ impl AdvancedTimer {
             }
             0x30 => self.repetition = value & 0xffff,
             0x34..=0x40 => self.set_compare((offset as usize - 0x34) / 4, value),
-            0x44 => self.write_bdtr(value)?,
+            0x44 => self.write_bdtr(value, now)?,
             0x48 | 0x4c => self.set_compare((offset as usize - 0x48) / 4 + 4, value & 0xffff),
             0x54 => only("DTR2", value, 0)?,
             0x58 => only("ECR", value, 0)?,
             0x5c => only("TISEL", value, 0)?,
             0x60 => {
                 only("AF1", value, 0x201)?;
-                self.af1 = value;
-                self.apply_break();
+                if self.lock_level() == 0 {
+                    self.af1 = value;
+                }
+                self.follow_break(now);
             }
             0x64 => only("AF2", value, 1)?,
             _ => return Err(Refusal::no_register(offset)),
@@ -543,18 +646,76 @@ mod tests {
     fn a_low_break_pin_switches_off_and_stays_off() {
         let mut timer = driving();
         timer.write(0x0c, 0x80, 100).expect("DIER BIE");
-        timer.set_break_pin(false);
+        timer.set_break_pin(false, 100);
         assert!(!timer.main_output() && timer.break_line());
-        assert_eq!(timer.leg(0), Leg::Off);
+        assert_eq!(timer.leg(0), Leg::Floating, "OSSI 0");
         timer.write(0x10, !0x80, 101).expect("SR");
         assert!(timer.break_line(), "the flag comes back while the pin is low");
         timer.write(0x44, 0x0000_9022, 102).expect("BDTR MOE");
         assert!(!timer.main_output());
-        timer.set_break_pin(true);
+        timer.set_break_pin(true, 102);
         assert!(!timer.main_output(), "no automatic re-enable");
         timer.write(0x10, !0x80, 103).expect("SR");
         timer.write(0x44, 0x0000_9022, 104).expect("BDTR MOE");
         assert!(timer.main_output() && !timer.break_line());
+    }
+
+    #[test]
+    fn off_states_drive_the_gates_low() {
+        let mut timer = driving();
+        timer.write(0x44, 0x9c22, 100).expect("BDTR BKE MOE OSSI OSSR DTG");
+        timer.set_break_pin(false, 101);
+        assert_eq!(timer.leg(0), Leg::Off, "OSSI 1");
+        timer.set_break_pin(true, 102);
+        timer.write(0x10, !0x80, 103).expect("SR");
+        timer.write(0x44, 0x9c22, 104).expect("BDTR MOE");
+        timer.freeze(true, 105);
+        assert_eq!((timer.leg(0), timer.next_event()), (Leg::Off, NEVER));
+        let count = timer.read(0x24, 105);
+        assert_eq!(timer.read(0x24, 1000), count);
+        timer.freeze(false, 1005);
+        assert_eq!((timer.read(0x24, 1005), timer.next_event()), (count, 1005));
+        timer.write(0x20, 0x51, 1005).expect("CCER without CC1NE");
+        assert_eq!(timer.leg(0), Leg::Off, "OSSR 1");
+        timer.write(0x20, 0x50, 1005).expect("CCER without CC1E and CC1NE");
+        assert_eq!(timer.leg(0), Leg::Floating);
+    }
+
+    #[test]
+    fn the_break_filter_keeps_short_pulses_away() {
+        let mut timer = driving();
+        // BKF 9: 8 samples of CK_INT / 8.
+        timer.write(0x44, 9 << 16 | 0x9022, 100).expect("BDTR");
+        timer.set_break_pin(false, 1000);
+        assert_eq!((timer.main_output(), timer.break_event()), (true, 1064));
+        timer.set_break_pin(true, 1063);
+        assert_eq!((timer.main_output(), timer.break_event()), (true, NEVER));
+        timer.set_break_pin(false, 2000);
+        timer.pass_break();
+        assert!(!timer.main_output());
+        timer.set_break_pin(true, 2100);
+        timer.write(0x44, 9 << 16 | 0x9022, 2101).expect("BDTR MOE");
+        assert!(!timer.main_output(), "the filter holds the level for 64 cycles");
+        timer.pass_break();
+        timer.write(0x44, 9 << 16 | 0x9022, 2164).expect("BDTR MOE");
+        assert!(timer.main_output());
+    }
+
+    #[test]
+    fn a_lock_protects_until_the_next_reset_and_is_written_once() {
+        let mut timer = small(0);
+        timer.write(0x18, 0x6868, 100).expect("CCMR1");
+        timer.write(0x20, 0x55, 100).expect("CCER");
+        timer.write(0x44, 9 << 16 | LOCK | 0x1c3c, 100).expect("BDTR level 3");
+        timer.write(0x44, 0x8000, 100).expect("BDTR");
+        assert_eq!(timer.read(0x44, 100), Ok(9 << 16 | LOCK | 0x9c3c), "MOE alone changed");
+        timer.write(0x18, 0, 100).expect("CCMR1");
+        timer.write(0x20, 0xff, 100).expect("CCER");
+        assert_eq!((timer.read(0x18, 100), timer.read(0x20, 100)), (Ok(0x6868), Ok(0x55)));
+        timer.reset();
+        timer.write(0x44, 0x22, 100).expect("BDTR");
+        timer.write(0x44, LOCK | 0x22, 100).expect("BDTR");
+        assert_eq!(timer.read(0x44, 100), Ok(0x22), "the first write decided");
     }
 
     #[test]

@@ -28,7 +28,12 @@ impl Dbgmcu {
         })
     }
 
-    /// Writes the register at `offset`. The core is never halted by a debugger, so freezing changes nothing.
+    /// Whether TIM1 stands while a debugger holds the core (APB2FZR, `DBG_TIM1_STOP`).
+    pub(crate) fn stops_tim1(&self) -> bool {
+        self.freeze[2] >> 11 & 1 == 1
+    }
+
+    /// Writes the register at `offset`. Of the freezing bits only that of TIM1 is modelled; the others are kept.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
         match offset {
             0x04 => {

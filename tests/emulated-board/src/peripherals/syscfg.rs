@@ -1,4 +1,6 @@
-//! System configuration: EXTI port selection; all else reads its reset value (RM0440, SYSCFG).
+//! System configuration: EXTI port selection, what breaks the advanced timers; all else reads its reset value (RM0440, SYSCFG).
+//!
+//! RAM has no parity errors here, and a core that locks up ends the run.
 
 use crate::error::{Refusal, only};
 
@@ -7,6 +9,7 @@ use crate::error::{Refusal, only};
 pub(crate) struct Syscfg {
     exticr: [u32; 4],
     cfgr1: u32,
+    cfgr2: u32,
 }
 
 impl Syscfg {
@@ -23,7 +26,8 @@ impl Syscfg {
     /// Value of the register at `offset`.
     pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
         Ok(match offset {
-            0x00 | 0x18 | 0x1c => 0,
+            0x00 | 0x18 => 0,
+            0x1c => self.cfgr2,
             0x04 => self.cfgr1,
             0x08..=0x14 => self.exticr[(offset as usize - 8) / 4],
             _ => return Err(Refusal::no_register(offset)),
@@ -40,6 +44,11 @@ impl Syscfg {
                 self.cfgr1 = value;
             }
             0x08..=0x14 => self.exticr[(offset as usize - 8) / 4] = value & 0xffff,
+            0x1c => {
+                only("CFGR2", value, 0xf)?;
+                // Set by software, cleared by reset only.
+                self.cfgr2 |= value;
+            }
             _ => return Err(Refusal::no_register(offset)),
         }
         Ok(())

@@ -1,19 +1,26 @@
 //! The bridge's fault line acts in hardware: no instruction of the firmware is needed.
 
 use bowden_board::{Injection, TICK_MARKER};
-use bowden_link::Fault;
+use bowden_link::{Fault, State};
 use bowden_on_board_tests::Outcome;
+use bowden_on_board_tests::host::Host;
 
 use crate::stop::{checked, moving};
+use crate::{ready, switched_on};
+
+/// Lets the marker of the tick fall: a tick that is held half done is a late one.
+fn between_ticks(host: &mut Host) -> Outcome {
+    while host.board.output(TICK_MARKER) == Some(true) {
+        host.pass(1e-6)?;
+    }
+    Ok(())
+}
 
 #[test]
 fn the_break_input_opens_the_bridge_while_the_core_stands() -> Outcome {
     let mut host = moving()?;
-    // Between two ticks: a tick that is held half done is a late one.
-    while host.board.output(TICK_MARKER) == Some(true) {
-        host.pass(1e-6)?;
-    }
-    host.board.halt_core(true);
+    between_ticks(&mut host)?;
+    host.board.stall_core(true);
     host.board.run_for(1e-3)?;
     assert!(host.board.pwm().duty.is_some(), "without a core the bridge goes on with its last duty");
     let instructions = host.board.counters().instructions;
@@ -21,13 +28,14 @@ fn the_break_input_opens_the_bridge_while_the_core_stands() -> Outcome {
     host.board.run_for(1e-6)?;
     let pwm = host.board.pwm();
     assert_eq!((pwm.duty, pwm.legs, pwm.main_output), (None, [None, None], false));
+    assert_eq!(pwm.driven, [true, true], "the gates are held low");
     assert_eq!(host.board.counters().instructions, instructions);
     // The line's recovery does not switch the bridge on again.
     host.board.clear(Injection::BridgeFault);
     host.board.run_for(5e-3)?;
     assert!(!host.board.pwm().main_output);
     // The core finds it when it goes on.
-    host.board.halt_core(false);
+    host.board.stall_core(false);
     let record = host.await_fault(0.1)?;
     assert_eq!(record.fault, Fault::BridgeFault, "{record}");
     checked(&mut host, record)
@@ -40,5 +48,60 @@ fn dead_time_and_rate_are_as_set() -> Outcome {
     // 2 · 4250 cycles of 170 MHz are 20 kHz; 60 cycles of dead time are 353 ns.
     assert_eq!((pwm.reload, pwm.dead_time_raw), (4250, 60));
     assert!(pwm.enabled && pwm.main_output && pwm.legs.iter().all(Option::is_some), "{pwm:?}");
+    Ok(())
+}
+
+#[test]
+fn the_gates_are_driven_from_the_start_whether_the_bridge_is_on_or_off() -> Outcome {
+    let mut host = switched_on(1)?;
+    assert_eq!((host.board.pwm().duty, host.board.pwm().driven), (None, [true, true]));
+    host.make_ready()?;
+    assert_eq!((host.board.pwm().duty, host.board.pwm().driven), (None, [true, true]));
+    Ok(())
+}
+
+#[test]
+fn a_short_pulse_on_the_fault_line_is_no_fault() -> Outcome {
+    let mut host = moving()?;
+    between_ticks(&mut host)?;
+    // The core is stalled, so that time is not counted in whole blocks of its code.
+    host.board.stall_core(true);
+    host.board.inject(Injection::BridgeFault);
+    host.board.run_for(0.3e-6)?;
+    host.board.clear(Injection::BridgeFault);
+    host.board.run_for(10e-6)?;
+    host.board.stall_core(false);
+    host.run(0.01)?;
+    assert_eq!((host.status()?.state, host.status()?.fault), (State::Run, None));
+    // The filter is what kept it away: 0.1 us longer, and it is one.
+    between_ticks(&mut host)?;
+    host.board.stall_core(true);
+    host.board.inject(Injection::BridgeFault);
+    host.board.run_for(0.4e-6)?;
+    host.board.clear(Injection::BridgeFault);
+    host.board.stall_core(false);
+    assert_eq!(host.await_fault(0.1)?.fault, Fault::BridgeFault);
+    Ok(())
+}
+
+#[test]
+fn a_debugger_that_holds_the_core_stops_the_motor() -> Outcome {
+    let mut host = moving()?;
+    between_ticks(&mut host)?;
+    host.board.halt_core(true);
+    let pwm = host.board.pwm();
+    assert_eq!((pwm.duty, pwm.driven), (None, [true, true]));
+    host.board.run_for(1e-3)?;
+    assert_eq!(host.board.pwm().duty, None);
+    Ok(())
+}
+
+/// `TIM1_BDTR`, by which a program gone wild could let the bridge short the bus.
+#[test]
+fn protection_of_the_bridge_is_locked() -> Outcome {
+    let host = ready(1)?;
+    let pwm = host.board.pwm();
+    // Level 3 protects dead time, polarities, off states, break and output modes until the next reset.
+    assert_eq!(pwm.lock_level, 3);
     Ok(())
 }
