@@ -12,6 +12,7 @@ mod limits;
 pub mod params;
 mod port;
 pub mod record;
+pub mod recover;
 pub mod replay;
 pub mod send;
 pub mod simulate;

@@ -132,8 +132,8 @@ fn a_recording_that_cannot_be_used_is_named_with_its_place() {
     let length = damaged.len();
     damaged[length - 6] ^= 0x55;
     let damaged_line = format!(
-        "rec.csv.gz: after byte {} of the table: corrupt gzip stream does not have a matching checksum; copy or \
-         record the file again",
+        "rec.csv.gz: after byte {} of the table: corrupt gzip stream does not have a matching checksum; copy \
+         the file again, or take out what is whole with `bowden recover`",
         good_csv().len()
     );
     let short: String = good_csv().split_inclusive('\n').take(11).collect();

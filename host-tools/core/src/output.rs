@@ -91,6 +91,14 @@ pub fn write_file(
     })
 }
 
+/// Writes a text file; it appears under its name only when it is complete.
+///
+/// # Errors
+/// The reason why the medium refuses.
+pub fn write_text(path: &Path, text: &str) -> io::Result<()> {
+    write_through(path, |file| file.write_all(text.as_bytes()))
+}
+
 fn write_through(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
     // A link is followed, so that it goes on pointing where it did.
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -114,7 +122,8 @@ fn fill(file: &File, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>
     buffered.flush()
 }
 
-fn folder_of(path: &Path) -> PathBuf {
+/// Folder of a file.
+pub(crate) fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(folder) if folder != Path::new("") => folder.to_owned(),
         _ => PathBuf::from("."),

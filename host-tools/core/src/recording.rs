@@ -9,18 +9,23 @@ mod build;
 mod column;
 mod columns;
 mod comma_separated;
+mod durable;
 mod file;
 mod format;
 mod frozen;
+mod gzip_members;
 mod mcap_file;
+mod metadata;
 mod origin;
 mod place;
+mod recover;
 mod row;
 mod row_writer;
 mod spikes;
 mod tail;
 mod text_column;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -28,9 +33,12 @@ use bowden_model::channel::Channel;
 
 pub use column::Column;
 pub use columns::{ColumnMap, ColumnSource, TIME_ROLE};
+pub use durable::{DurableFile, DurableWriter, SAVE_INTERVAL, Saved};
 pub use format::Format;
-pub use mcap_file::TOPIC;
+pub use mcap_file::{SCHEMA, TOPIC};
+pub use metadata::Metadata;
 pub use place::Places;
+pub use recover::{Recovered, recover};
 pub use row::{Cell, RowColumn};
 pub use row_writer::RowWriter;
 pub use text_column::TextColumn;
@@ -59,6 +67,9 @@ pub struct Recording {
     places: Places,
     notes: Vec<String>,
     passed_over: Vec<String>,
+    metadata: Metadata,
+    /// Units of columns that are no roles, where the file says them.
+    units: BTreeMap<String, String>,
 }
 
 /// Two recordings are equal when they hold the same samples, wherever they came from.
@@ -78,6 +89,8 @@ impl Recording {
             places: Places::samples(),
             notes: Vec::new(),
             passed_over: Vec::new(),
+            metadata: Metadata::default(),
+            units: BTreeMap::new(),
         }
     }
 
@@ -285,6 +298,16 @@ impl Recording {
         &self.passed_over
     }
 
+    /// What the file says beside the rows; it is kept where the recording is written as MCAP.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// Says something else beside the rows.
+    pub fn set_metadata(&mut self, metadata: Metadata) {
+        self.metadata = metadata;
+    }
+
     /// Where a sample stands in its file, as messages begin: `rec.csv:12` is line 12.
     pub fn place(&self, sample: usize) -> String {
         self.places.describe(&self.source, sample)
@@ -309,6 +332,8 @@ impl Recording {
             places: self.places.after(samples.start),
             notes: self.notes.clone(),
             passed_over: self.passed_over.clone(),
+            metadata: self.metadata.clone(),
+            units: self.units.clone(),
         }
     }
 }

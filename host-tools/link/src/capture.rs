@@ -1,20 +1,20 @@
 //! One run into one file: every tick of it, or every N-th, and what made it beside it.
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use bowden_core::outcome::Failure;
 use bowden_core::output;
 use bowden_core::progress::Progress;
-use bowden_core::recording::{Format, RowWriter};
+use bowden_core::recording::{DurableFile, Format, Metadata};
 use bowden_link::message::Mode;
 
-use super::conversion::{Conversion, columns};
+use super::conversion::Conversion;
 use super::course::Course;
 use super::error::LinkError;
 use super::parameters::ParameterSet;
-use super::recorder::{Recorder, Tally};
+use super::recorder::{Form, Recorder, Tally};
 use super::session::{RunEnd, Session, Stop};
 
 /// Name under which an MCAP file keeps firmware version and parameters.
@@ -50,47 +50,55 @@ impl Capture<'_> {
         stop: Stop,
         progress: &dyn Progress,
     ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
-        let conversion = Conversion::new(session.parameters())?;
-        let metadata = session.parameters().metadata();
-        let mut end = None;
-        let mut tally = Tally::default();
-        let written = output::write_file(self.out, |file| {
-            let writer =
-                RowWriter::new(self.format, &columns(Some(self.mode)), Some((METADATA, metadata)), file)?;
-            let mut recorder = Recorder::new(writer, conversion, self.mode, self.every);
-            let mut refusal = None;
-            let mut shown = 0;
-            end = Some(session.run(self.mode, course, stop, &mut |tick| {
-                if let Err(error) = recorder.tick(tick) {
-                    refusal = Some(error);
-                    return ControlFlow::Break(());
-                }
-                let Some(seconds) = self.seconds else { return ControlFlow::Continue(()) };
-                let share = recorder.tally().duration_s() / seconds;
-                let step = ((share * PROGRESS_STEPS as f64) as u64).min(PROGRESS_STEPS);
-                progress.advance(step - shown);
-                shown = step;
-                // Half a nanosecond is below every control period.
-                if recorder.tally().duration_s() >= seconds - 5e-10 {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            }));
-            if let Some(error) = refusal {
-                return Err(error);
+        let parameters = session.parameters();
+        let mut metadata = Metadata::default();
+        metadata.extend(METADATA, parameters.metadata());
+        let beside = match self.format {
+            Format::Mcap => Vec::new(),
+            Format::Csv | Format::GzippedCsv => vec![(sidecar(self.out), parameters.to_toml())],
+        };
+        let form = Form {
+            format: self.format,
+            conversion: Conversion::new(parameters)?,
+            mode: self.mode,
+            every: self.every,
+            metadata,
+            beside,
+        };
+        // Before anything moves, so that a file that cannot be written stops nothing half way.
+        let file = DurableFile::open(self.out).map_err(|error| {
+            let (out, reason) = (self.out.display(), output::describe(&error));
+            Failure::failed(format!("{out}: cannot be written: {reason}; choose another place"))
+        })?;
+        let mut recorder = Recorder::new(file, form, self.out);
+        let mut shown = 0;
+        let end = session.run(self.mode, course, stop, &mut |tick| {
+            if !recorder.tick(tick) {
+                return ControlFlow::Break(());
             }
-            tally = recorder.finish()?;
-            if tally.rows == 0 { Err(io::Error::other("the run gave no sample")) } else { Ok(()) }
+            let Some(seconds) = self.seconds else { return ControlFlow::Continue(()) };
+            let share = recorder.tally().duration_s() / seconds;
+            let step = ((share * PROGRESS_STEPS as f64) as u64).min(PROGRESS_STEPS);
+            progress.advance(step - shown);
+            shown = step;
+            // Half a nanosecond is below every control period.
+            if recorder.tally().duration_s() >= seconds - 5e-10 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         });
-        match (written, end) {
-            (Ok(()), Some(end)) => Ok((tally, end)),
-            // Without a row there is nothing to keep, and what ended the run counts.
-            (Err(_), Some(Err(error))) => Err(error.into()),
-            (Err(_), Some(Ok(RunEnd::Fault(fault)))) => Err(LinkError::Fault(fault).into()),
-            (Err(_), Some(Ok(RunEnd::Interrupted))) if tally.rows == 0 => Err(LinkError::Interrupted.into()),
-            (Err(failure), _) => Err(failure),
-            (Ok(()), None) => Err(Failure::failed("the run did not begin; run it again")),
+        let tally = recorder.finish(&Metadata::default())?;
+        // Without a row there is nothing to keep, and what ended the run counts.
+        match end {
+            end if tally.rows > 0 => Ok((tally, end)),
+            Err(error) => Err(error.into()),
+            Ok(RunEnd::Fault(fault)) => Err(LinkError::Fault(fault).into()),
+            Ok(RunEnd::Interrupted) => Err(LinkError::Interrupted.into()),
+            Ok(RunEnd::Complete | RunEnd::Left(_)) => {
+                let out = self.out.display();
+                Err(Failure::failed(format!("{out}: cannot be written: the run gave no sample")))
+            }
         }
     }
 }

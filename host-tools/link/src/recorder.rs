@@ -1,21 +1,57 @@
 //! Rows of a recording from the ticks of a run, one at a time.
+//!
+//! A thread of its own writes them, so that a slow medium does not silence the host, whom the board would stop the joint for.
 
-use std::io::{self, Seek, Write};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
 
-use bowden_core::recording::RowWriter;
+use bowden_core::outcome::Failure;
+use bowden_core::output;
+use bowden_core::recording::{DurableFile, DurableWriter, Format, Metadata, Saved};
 use bowden_link::message::Mode;
 
-use super::conversion::Conversion;
+use super::conversion::{Conversion, columns};
 use super::losses::Losses;
 use super::session::RunTick;
 
+/// Rows that may wait for the medium: 6.5 s at 10 kHz, 5 MB.
+const QUEUE: usize = 1 << 16;
+
 /// Writes ticks and counts what is missing between them.
-pub struct Recorder<W: Write + Seek> {
-    writer: RowWriter<W>,
+pub struct Recorder {
+    path: PathBuf,
+    rows: SyncSender<RunTick>,
+    writer: JoinHandle<Result<Option<DurableWriter>, Broken>>,
     conversion: Conversion,
-    mode: Mode,
     every: u64,
     tally: Tally,
+}
+
+/// What a recording is, beside its ticks.
+#[derive(Clone, Debug)]
+pub struct Form {
+    /// Format of the file.
+    pub format: Format,
+    /// SI values from raw ones.
+    pub conversion: Conversion,
+    /// What is controlled.
+    pub mode: Mode,
+    /// Only every N-th tick is written, beginning with the first.
+    pub every: u64,
+    /// What stands before the rows.
+    pub metadata: Metadata,
+    /// Files that stand beside the recording, with their text.
+    pub beside: Vec<(PathBuf, String)>,
+}
+
+/// The medium refused.
+#[derive(Debug)]
+struct Broken {
+    error: io::Error,
+    /// What is kept all the same.
+    saved: Saved,
 }
 
 /// What was recorded.
@@ -42,24 +78,25 @@ pub fn tick_time_s(tick: u64, period_ns: u32) -> f64 {
     (u128::from(tick) * u128::from(period_ns)) as f64 / 1e9
 }
 
-impl<W: Write + Seek> Recorder<W> {
-    /// Writes every `every`-th tick, beginning with the first.
-    pub fn new(writer: RowWriter<W>, conversion: Conversion, mode: Mode, every: u64) -> Self {
-        Self { writer, conversion, mode, every: every.max(1), tally: Tally::default() }
+impl Recorder {
+    /// Writes to a file, whose name is `path` in messages. What it holds stays until the first tick comes.
+    pub fn new(file: DurableFile, form: Form, path: &Path) -> Self {
+        let (rows, received) = sync_channel(QUEUE);
+        let (conversion, every) = (form.conversion, form.every.max(1));
+        let writer = thread::spawn(move || write(file, &form, &received));
+        Self { path: path.to_owned(), rows, writer, conversion, every, tally: Tally::default() }
     }
 
-    /// Takes a tick.
-    ///
-    /// # Errors
-    /// When the medium refuses.
-    pub fn tick(&mut self, tick: &RunTick) -> io::Result<()> {
-        let RunTick { tick, period_ns, sample } = tick;
+    /// Takes a tick; `false` once the medium has refused, which [`Recorder::finish`] tells.
+    #[must_use]
+    pub fn tick(&mut self, tick: &RunTick) -> bool {
+        let RunTick { tick: number, period_ns, sample } = *tick;
         let tally = &mut self.tally;
-        tally.period_ns = *period_ns;
+        tally.period_ns = period_ns;
         let first = match tally.ticks {
-            None => *tick,
+            None => number,
             Some((first, last)) => {
-                let missing = tick.saturating_sub(last + 1);
+                let missing = number.saturating_sub(last + 1);
                 if missing > 0 {
                     tally.missing += missing;
                     tally.gaps += 1;
@@ -68,14 +105,13 @@ impl<W: Write + Seek> Recorder<W> {
                 first
             }
         };
-        tally.ticks = Some((first, *tick));
-        tally.bus_v.get_or_insert_with(|| self.conversion.bus_v(sample));
-        if (tick - first).is_multiple_of(self.every) {
-            tally.rows += 1;
-            let cells = self.conversion.cells(sample, Some(self.mode));
-            self.writer.row(tick_time_s(*tick, *period_ns), cells)?;
+        tally.ticks = Some((first, number));
+        tally.bus_v.get_or_insert_with(|| self.conversion.bus_v(&sample));
+        if !(number - first).is_multiple_of(self.every) {
+            return true;
         }
-        Ok(())
+        tally.rows += 1;
+        self.rows.send(*tick).is_ok()
     }
 
     /// What was recorded so far.
@@ -83,13 +119,66 @@ impl<W: Write + Seek> Recorder<W> {
         &self.tally
     }
 
-    /// Ends the recording.
+    /// Ends the recording with what is known at its end. Without a row the file is as it was before.
     ///
     /// # Errors
-    /// When the medium refuses.
-    pub fn finish(self) -> io::Result<Tally> {
-        self.writer.finish()?;
-        Ok(self.tally)
+    /// Exit status 1 with what is kept, if the medium refused.
+    pub fn finish(self, metadata: &Metadata) -> Result<Tally, Failure> {
+        let Self { path, rows, writer, tally, .. } = self;
+        drop(rows);
+        let written = match writer.join() {
+            Ok(Ok(Some(mut rows))) => {
+                rows.finish(metadata).map(|()| tally).map_err(|error| Broken { error, saved: rows.saved() })
+            }
+            Ok(written) => written.map(|_| tally),
+            Err(_) => Err(Broken { error: io::Error::other("its thread ended"), saved: Saved::default() }),
+        };
+        written.map_err(|Broken { error, saved }| {
+            let first_s = tally.ticks.map_or(0.0, |(first, _)| tick_time_s(first, tally.period_ns));
+            Failure::failed(format!(
+                "{}: cannot be written: {}; {} rows over {:.3} s are kept; make room and record again",
+                path.display(),
+                output::describe(&error),
+                saved.rows,
+                saved.last_s.map_or(0.0, |last_s| last_s - first_s)
+            ))
+        })
+    }
+}
+
+/// Writes what comes, and puts it on the medium when it is due.
+fn write(
+    file: DurableFile,
+    form: &Form,
+    received: &Receiver<RunTick>,
+) -> Result<Option<DurableWriter>, Broken> {
+    let Ok(first) = received.recv() else {
+        file.abandon();
+        return Ok(None);
+    };
+    let nothing = |error| Broken { error, saved: Saved::default() };
+    for (path, text) in &form.beside {
+        output::write_text(path, text).map_err(nothing)?;
+    }
+    let mut rows = file.begin(form.format, &columns(Some(form.mode)), &form.metadata).map_err(nothing)?;
+    let mut next = Some(first);
+    loop {
+        let written = match next {
+            Some(RunTick { tick, period_ns, sample }) => {
+                rows.row(tick_time_s(tick, period_ns), form.conversion.cells(&sample, Some(form.mode)))
+            }
+            None => rows.save(),
+        };
+        written.map_err(|error| Broken { error, saved: rows.saved() })?;
+        let received = match rows.time_left() {
+            Some(time_left) => received.recv_timeout(time_left),
+            None => received.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        next = match received {
+            Ok(tick) => Some(tick),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => return Ok(Some(rows)),
+        };
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
-use bowden_core::recording::{Format, RowWriter};
+use bowden_core::recording::{Format, Metadata, RowWriter};
 use bowden_host_link::conversion::{Conversion, columns};
 use bowden_host_link::recorder::tick_time_s;
 use bowden_host_link::{Client, LinkError, ParameterSet};
@@ -114,12 +114,12 @@ fn save_snapshot(client: &mut Client, status: &Status, path: &Path) -> Result<Op
         )));
     }
     output::write_file(path, |file| {
-        let mut writer = RowWriter::new(format, &columns(None), None, file)?;
+        let mut writer = RowWriter::new(format, &columns(None), &Metadata::default(), file)?;
         for (tick, sample) in &samples {
             let t_s = tick_time_s((*tick).into(), status.period_ns);
             writer.row(t_s, conversion.cells(sample, None))?;
         }
-        writer.finish()
+        writer.finish(&Metadata::default())
     })?;
     let consecutive = samples.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
     let whole = consecutive && samples.len() == usize::from(status.snapshot);

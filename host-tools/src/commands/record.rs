@@ -6,7 +6,7 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
 use bowden_core::recording::Format;
-use bowden_host_link::capture::{Capture, PROGRESS_STEPS, save_parameters, sidecar};
+use bowden_host_link::capture::{Capture, PROGRESS_STEPS, sidecar};
 use bowden_host_link::course::Course;
 use bowden_host_link::recorder::Tally;
 use bowden_host_link::rig_file::{self, Weight};
@@ -102,9 +102,6 @@ impl RecordArguments {
         let (tally, end) = capture.run(&mut session, &course, stop, progress)?;
 
         let parameters = session.parameters();
-        if let Some(path) = &sidecar {
-            save_parameters(path, parameters)?;
-        }
         if let Some(path) = &self.rig {
             let name = self.out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
             let text = rig_file::text(&name, parameters, tally.bus_v.unwrap_or_default(), self.load)?;

@@ -6,6 +6,7 @@
 mod client;
 #[path = "../common/mod.rs"]
 mod common;
+mod cuts;
 mod fake;
 mod from_rig;
 mod mishaps;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bowden_model::channel::Channel;
 
-use super::row::{Cell, RowColumn};
+use super::row::Cell;
 use super::text_column::TextColumn;
 
 /// One column beside the time.
@@ -27,13 +27,6 @@ impl Column {
         match self {
             Self::Known { channel, .. } => channel.role(),
             Self::Unknown(text) => text.name(),
-        }
-    }
-
-    pub(super) fn written(&self) -> RowColumn {
-        match self {
-            Self::Known { channel, .. } => RowColumn::Known(*channel),
-            Self::Unknown(text) => RowColumn::Unknown(text.name().to_owned()),
         }
     }
 

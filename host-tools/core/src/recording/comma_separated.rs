@@ -18,7 +18,7 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
     text.consume(mark);
     let mut lines = Lines::new(text, mark as u64);
 
-    let mut origin = Origin { source, places: Places::lines(), notes: Vec::new(), passed_over: Vec::new() };
+    let mut origin = Origin::new(source, Places::lines());
     let Some(header_line) = lines.next(&origin.source)? else {
         return Err(Failure::bad_input(format!(
             "{}:1: the file has no line, expected a header with t_s; record again",
@@ -162,7 +162,7 @@ fn damaged(source: &str, byte: u64, error: &csv::Error) -> Failure {
         _ => error.to_string(),
     };
     Failure::bad_input(format!(
-        "{source}: after byte {byte} of the table: {reason}; copy or record the file again"
+        "{source}: after byte {byte} of the table: {reason}; copy the file again, or take out what is whole with `bowden recover`"
     ))
 }
 
@@ -223,6 +223,11 @@ impl<W: Write> Writer<W> {
         }
         self.table.write_record(None::<&[u8]>)?;
         Ok(())
+    }
+
+    /// Hands on all rows.
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.table.flush()
     }
 
     /// Ends the table and gives back what it was written to.

@@ -5,13 +5,14 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::{
-    Column, Format, READ_BUFFER, ReadOptions, Recording, RowColumn, RowWriter, comma_separated, mcap_file,
+    Column, Format, Metadata, READ_BUFFER, ReadOptions, Recording, RowColumn, RowWriter, comma_separated,
+    mcap_file,
 };
 use crate::outcome::Failure;
 use crate::output;
 
 /// First bytes of gzip data.
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 impl Recording {
     /// Reads a file. The content decides between CSV, gzipped CSV and MCAP, whatever the file is called.
@@ -62,13 +63,24 @@ impl Recording {
     /// A name that asks for no known format (see [`Format::for_output`]), or the reason why the medium refuses.
     pub fn save(&self, path: &Path) -> Result<(), Failure> {
         let format = Format::for_output(path)?;
-        let columns: Vec<RowColumn> = self.columns.iter().map(Column::written).collect();
+        let columns: Vec<RowColumn> = self.columns.iter().map(|column| self.written(column)).collect();
         output::write_file(path, |file| {
-            let mut writer = RowWriter::new(format, &columns, None, file)?;
+            let mut writer = RowWriter::new(format, &columns, &self.metadata, file)?;
             for (sample, t_s) in self.t_s.iter().enumerate() {
                 writer.row(*t_s, self.columns.iter().map(|column| column.cell(sample)))?;
             }
-            writer.finish()
+            writer.finish(&Metadata::default())
         })
+    }
+
+    /// A column as it is written, with its unit where that is known.
+    fn written(&self, column: &Column) -> RowColumn {
+        match column {
+            Column::Known { channel, .. } => RowColumn::Known(*channel),
+            Column::Unknown(text) => match self.units.get(text.name()) {
+                Some(unit) => RowColumn::described(text.name(), unit),
+                None => RowColumn::Unknown(text.name().to_owned()),
+            },
+        }
     }
 }

@@ -10,7 +10,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io::{self, Read, Seek, Write};
 
-use mcap::sans_io::LinearReaderOptions;
+use mcap::McapError;
+use mcap::read::ChannelAccumulator;
+use mcap::records::{Metadata, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
@@ -26,40 +29,66 @@ use crate::outcome::Failure;
 pub const TOPIC: &str = "/bowden/samples";
 
 /// Name of the schema of a sample.
-const SCHEMA: &str = "bowden.Sample";
+pub const SCHEMA: &str = "bowden.Sample";
 
 /// Largest record that is read, bytes; a length beyond it is damage.
-const RECORD_LIMIT: usize = 1 << 28;
+pub(super) const RECORD_LIMIT: usize = 1 << 28;
+
+/// Samples of a chunk before compression, bytes: what a damaged byte costs.
+const CHUNK_BYTES: u64 = 1 << 20;
 
 /// Reads the samples as they stream past.
 pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Result<Recording, Failure> {
-    let reader_options = LinearReaderOptions::default().with_record_length_limit(RECORD_LIMIT);
-    let messages = mcap::io::MessageReader::new_with_options(data, reader_options);
-    let mut origin =
-        Origin { source, places: Places::messages(), notes: Vec::new(), passed_over: Vec::new() };
+    let mut origin = Origin::new(source, Places::messages());
     let mut other_topics = BTreeSet::new();
     let mut table: Option<Table> = None;
     let mut number = 0;
-    for message in messages {
-        let message = match message {
-            Ok(message) => message,
-            Err(mcap::McapError::UnexpectedEof) if table.is_some() => {
+    let mut records = Records::new(data);
+    let mut channels = ChannelAccumulator::default();
+    loop {
+        let damaged = |error: McapError| {
+            Failure::bad_input(format!(
+                "{}: after message {number}: {error}; take out what is whole with `bowden recover`",
+                origin.source
+            ))
+        };
+        let record = match records.next() {
+            Ok(Some(record)) => record,
+            Ok(None) => break,
+            Err(McapError::UnexpectedEof) if table.is_some() => {
                 origin.notes.push(format!(
                     "{}: the file ends early; the {number} whole samples before the end were used",
                     origin.source
                 ));
                 break;
             }
-            Err(error) => {
-                return Err(Failure::bad_input(format!(
-                    "{}: after message {number}: {error}; copy or record the file again",
-                    origin.source
-                )));
-            }
+            Err(error) => return Err(damaged(error)),
         };
-        if message.channel.topic != TOPIC {
-            if !other_topics.contains(&message.channel.topic) {
-                other_topics.insert(message.channel.topic.clone());
+        let (header, message) = match record {
+            Record::Schema { header, data } => {
+                if header.name == SCHEMA {
+                    origin.units = units_of(&data);
+                }
+                channels.add_schema(header, Cow::Owned(data.into_owned())).map_err(damaged)?;
+                continue;
+            }
+            Record::Channel(channel) => {
+                channels.add_channel(channel).map_err(damaged)?;
+                continue;
+            }
+            Record::Metadata(Metadata { name, metadata }) => {
+                origin.metadata.extend(&name, metadata);
+                continue;
+            }
+            Record::Message { header, data } => (header, data),
+            _ => continue,
+        };
+        let channel = channels
+            .get(header.channel_id)
+            .ok_or_else(|| damaged(McapError::UnknownChannel(header.sequence, header.channel_id)))?;
+        if channel.topic != TOPIC {
+            if !other_topics.contains(&channel.topic) {
+                other_topics.insert(channel.topic.clone());
             }
             continue;
         }
@@ -67,14 +96,13 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
         let refuse = |reason: String| {
             Failure::bad_input(format!("{}: {reason}", origin.places.describe_number(&origin.source, number)))
         };
-        let encoding = &message.channel.message_encoding;
+        let encoding = &channel.message_encoding;
         if encoding != "json" {
             return Err(refuse(format!(
                 "topic {TOPIC} is encoded as `{encoding}`, expected json; convert it"
             )));
         }
-        let row: Row = serde_json::from_slice(&message.data)
-            .map_err(|error| refuse(format!("not a JSON object: {error}; record again")))?;
+        let row = Row::parse(&message).map_err(&refuse)?;
         let cells = row.cells().map_err(&refuse)?;
         let table = if let Some(table) = &mut table {
             table
@@ -100,16 +128,82 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
     )))
 }
 
+/// Records of a file, those within chunks among them; a chunk is checked before its first record is given.
+pub(super) struct Records<R> {
+    data: R,
+    reader: LinearReader,
+}
+
+impl<R: Read> Records<R> {
+    /// Of a whole file.
+    fn new(data: R) -> Self {
+        Self::with(data, LinearReaderOptions::default().with_validate_data_section_crc(true))
+    }
+
+    /// Of one chunk, with its opcode and length before it.
+    pub(super) fn of_chunk(data: R) -> Self {
+        Self::with(data, LinearReaderOptions::default().with_skip_start_magic(true).with_skip_end_magic(true))
+    }
+
+    fn with(data: R, options: LinearReaderOptions) -> Self {
+        let options = options.with_record_length_limit(RECORD_LIMIT).with_prevalidate_chunk_crcs(true);
+        Self { data, reader: LinearReader::new_with_options(options) }
+    }
+
+    /// The next record; none at the end.
+    pub(super) fn next(&mut self) -> Result<Option<Record<'static>>, McapError> {
+        loop {
+            match self.reader.next_event() {
+                None => return Ok(None),
+                Some(Err(error)) => return Err(error),
+                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
+                    let into = self.reader.insert(wanted);
+                    let read = loop {
+                        match self.data.read(into) {
+                            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                            read => break read?,
+                        }
+                    };
+                    self.reader.notify_read(read);
+                }
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                    return mcap::parse_record(opcode, data).map(|record| Some(record.into_owned()));
+                }
+            }
+        }
+    }
+}
+
+/// Units of the columns, by the descriptions of a schema that this program wrote.
+pub(super) fn units_of(schema: &[u8]) -> BTreeMap<String, String> {
+    #[derive(Deserialize)]
+    struct Schema {
+        properties: BTreeMap<String, Property>,
+    }
+    #[derive(Deserialize)]
+    struct Property {
+        description: Option<String>,
+    }
+    let Ok(Schema { properties }) = serde_json::from_slice(schema) else { return BTreeMap::new() };
+    let units = properties.into_iter().filter_map(|(name, property)| Some((name, property.description?)));
+    units.filter(|(name, _)| name != TIME_ROLE).collect()
+}
+
 /// One message: properties in their order, values as they are written.
-struct Row<'m>(Vec<(Cow<'m, str>, &'m RawValue)>);
+pub(super) struct Row<'m>(Vec<(Cow<'m, str>, &'m RawValue)>);
 
 impl<'m> Row<'m> {
-    fn names(&self) -> impl Iterator<Item = &str> {
+    /// Reads a message; the error is what a message says after the place.
+    pub(super) fn parse(message: &'m [u8]) -> Result<Self, String> {
+        serde_json::from_slice(message).map_err(|error| format!("not a JSON object: {error}; record again"))
+    }
+
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(|(name, _)| name.as_ref())
     }
 
     /// Text of every value, strings without their quotes.
-    fn cells(&self) -> Result<Vec<Cow<'m, str>>, String> {
+    pub(super) fn cells(&self) -> Result<Vec<Cow<'m, str>>, String> {
         self.0
             .iter()
             .map(|(name, value)| {
@@ -184,20 +278,15 @@ pub(super) struct Writer<W: Write + Seek> {
 
 impl<W: Write + Seek> Writer<W> {
     /// Writes what stands before the samples: schema, channel, and the metadata under its name, if there is any.
-    pub(super) fn new(
-        columns: &[RowColumn],
-        metadata: Option<(&str, BTreeMap<String, String>)>,
-        out: W,
-    ) -> io::Result<Self> {
+    pub(super) fn new(columns: &[RowColumn], metadata: &super::Metadata, out: W) -> io::Result<Self> {
         let library = concat!("bowden ", env!("CARGO_PKG_VERSION"));
-        let mut file =
-            mcap::WriteOptions::new().profile("").library(library).create(out).map_err(io_error)?;
-        if let Some((name, metadata)) = metadata {
-            let metadata = mcap::records::Metadata { name: name.to_owned(), metadata };
-            file.write_metadata(&metadata).map_err(io_error)?;
-        }
+        // Without seeking a chunk is written when it is complete, and a file that is cut has no half one with a whole head.
+        let options = mcap::WriteOptions::new().profile("").library(library).chunk_size(Some(CHUNK_BYTES));
+        let options = options.disable_seeking(true).compression_threads(0);
+        let mut file = options.create(out).map_err(io_error)?;
+        write_metadata(&mut file, metadata)?;
         let schema = file.add_schema(SCHEMA, "jsonschema", &schema_of(columns)).map_err(io_error)?;
-        let channel = file.add_channel(schema, TOPIC, "json", &BTreeMap::new()).map_err(io_error)?;
+        let channel = file.add_channel(schema, TOPIC, "json", &units(columns)).map_err(io_error)?;
         let names = columns.iter().map(|column| serde_json::Value::from(column.name()).to_string()).collect();
         Ok(Self { file, channel, names, data: Vec::with_capacity(512), samples: 0 })
     }
@@ -227,11 +316,38 @@ impl<W: Write + Seek> Writer<W> {
         self.file.write_to_known_channel(&header, &self.data).map_err(io_error)
     }
 
+    /// Ends the chunk, so that a file that is cut behind it has all samples so far.
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.file.flush().map_err(io_error)
+    }
+
     /// Writes what stands behind the samples.
-    pub(super) fn finish(mut self) -> io::Result<()> {
+    pub(super) fn finish(mut self, metadata: &super::Metadata) -> io::Result<()> {
+        write_metadata(&mut self.file, metadata)?;
         self.file.finish().map_err(io_error)?;
         Ok(())
     }
+}
+
+fn write_metadata<W: Write + Seek>(file: &mut mcap::Writer<W>, metadata: &super::Metadata) -> io::Result<()> {
+    metadata.groups().try_for_each(|(name, entries)| {
+        let record = Metadata { name: name.to_owned(), metadata: entries.clone() };
+        file.write_metadata(&record).map_err(io_error)
+    })
+}
+
+/// Units by column, for the channel; a schema has a place for descriptions only.
+fn units(columns: &[RowColumn]) -> BTreeMap<String, String> {
+    let unit = |column: &RowColumn| match column {
+        RowColumn::Known(channel) => Some(channel.unit().to_owned()),
+        RowColumn::Described { unit, .. } => Some(unit.clone()),
+        RowColumn::Unknown(_) => None,
+    };
+    let columns = columns.iter().filter_map(|column| Some((column.name(), unit(column)?)));
+    std::iter::once((TIME_ROLE, "s".to_owned()))
+        .chain(columns)
+        .map(|(name, unit)| (format!("unit.{name}"), unit))
+        .collect()
 }
 
 fn io_error(error: mcap::McapError) -> io::Error {

@@ -1,8 +1,9 @@
 //! What readers share: where a recording comes from, and what they noted on the way.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Places, Recording, build};
+use super::{Metadata, Places, Recording, build};
 use crate::outcome::Failure;
 
 /// What readers share: a recording under construction.
@@ -11,9 +12,22 @@ pub(super) struct Origin {
     pub places: Places,
     pub notes: Vec<String>,
     pub passed_over: Vec<String>,
+    pub metadata: Metadata,
+    pub units: BTreeMap<String, String>,
 }
 
 impl Origin {
+    pub fn new(source: String, places: Places) -> Self {
+        Self {
+            source,
+            places,
+            notes: Vec::new(),
+            passed_over: Vec::new(),
+            metadata: Metadata::default(),
+            units: BTreeMap::new(),
+        }
+    }
+
     pub fn finish(self, table: build::Table) -> Result<Recording, Failure> {
         let (t_s, columns) = table.finish();
         if t_s.is_empty() {
@@ -30,6 +44,8 @@ impl Origin {
             places: self.places,
             notes: self.notes,
             passed_over: self.passed_over,
+            metadata: self.metadata,
+            units: self.units,
         })
     }
 }

@@ -8,7 +8,7 @@ use bowden_core::recording::Format;
 use bowden_link::message::Mode;
 use serde::Serialize;
 
-use crate::capture::{Capture, PROGRESS_STEPS, save_parameters, sidecar};
+use crate::capture::{Capture, PROGRESS_STEPS};
 use crate::course::Course;
 use crate::session::{RunEnd, Session, Stop};
 
@@ -79,9 +79,6 @@ impl Driver<'_> {
         let capture =
             Capture { out: &out, format, mode: Mode::Position, every: self.every, seconds: Some(*seconds) };
         let (tally, end) = capture.run(&mut self.session, course, self.stop, self.progress)?;
-        if format != Format::Mcap {
-            save_parameters(&sidecar(&out), self.session.parameters())?;
-        }
         self.recorded.push(Recorded {
             file: out.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             purpose: (*purpose).to_owned(),
