@@ -48,6 +48,50 @@ impl Failure {
     pub fn message(&self) -> &str {
         &self.message
     }
+
+    /// The message taken apart.
+    pub fn parts(&self) -> FailureParts<'_> {
+        FailureParts::of(&self.message)
+    }
+}
+
+/// What a message says: `FILE:LINE:COLUMN: what is wrong; what to do`, each part but the second where it is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FailureParts<'m> {
+    /// File, or what else the message is about.
+    pub source: Option<&'m str>,
+    /// Line, from 1.
+    pub line: Option<u64>,
+    /// Column, from 1.
+    pub column: Option<u64>,
+    /// What is wrong.
+    pub what: &'m str,
+    /// What to do.
+    pub hint: Option<&'m str>,
+}
+
+impl<'m> FailureParts<'m> {
+    fn of(message: &'m str) -> Self {
+        let (place, rest) = match message.split_once(": ") {
+            Some((place, rest)) => (Some(place), rest),
+            None => (None, message),
+        };
+        let (what, hint) = match rest.rsplit_once("; ") {
+            Some((what, hint)) => (what, Some(hint)),
+            None => (rest, None),
+        };
+        let mut source = place;
+        let mut numbers = Vec::new();
+        while let Some((before, number)) = source.and_then(|place| place.rsplit_once(':'))
+            && numbers.len() < 2
+            && let Ok(number) = number.parse()
+        {
+            numbers.push(number);
+            source = Some(before);
+        }
+        let mut numbers = numbers.into_iter().rev();
+        Self { source, line: numbers.next(), column: numbers.next(), what, hint }
+    }
 }
 
 /// How a command ended that did its work.
@@ -124,6 +168,36 @@ mod tests {
     fn messages_stay_one_line_whatever_a_file_is_called() {
         let failure = Failure::bad_input("a\nb\u{1b}[31m.csv: empty");
         assert_eq!(failure.message(), "a\\nb\\u{1b}[31m.csv: empty");
+    }
+
+    #[test]
+    fn a_message_is_taken_apart_into_place_reason_and_advice() {
+        let parts = |message: &str| Failure::bad_input(message).parts().shown();
+        for (message, expected) in [
+            (
+                "a.toml:3:7: unknown key `x`; did you mean `y`?",
+                "a.toml|3|7|unknown key `x`|did you mean `y`?",
+            ),
+            (
+                "a.csv:12: column `t_s`: got 1 s; sort the rows",
+                "a.csv|12|-|column `t_s`: got 1 s|sort the rows",
+            ),
+            ("a.mcap: byte 8: damaged; b; copy it again", "a.mcap|-|-|byte 8: damaged; b|copy it again"),
+            ("no rig; name it", "-|-|-|no rig|name it"),
+            ("nothing", "-|-|-|nothing|-"),
+        ] {
+            assert_eq!(parts(message), expected);
+        }
+    }
+
+    impl FailureParts<'_> {
+        fn shown(self) -> String {
+            let or_dash = |part: Option<String>| part.unwrap_or_else(|| "-".to_owned());
+            let text = |part: Option<&str>| or_dash(part.map(str::to_owned));
+            let number = |part: Option<u64>| or_dash(part.map(|number| number.to_string()));
+            [text(self.source), number(self.line), number(self.column), self.what.to_owned(), text(self.hint)]
+                .join("|")
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! stood in the file and written back untouched. Numbers are written in the shortest form that reads back to the
 //! same `f64`, so that converting between the formats and back changes no bit of them.
 
+mod arrays;
 mod build;
 mod column;
 mod columns;

@@ -114,7 +114,14 @@ impl Rig {
     /// See [`Recording::load`]; also fewer samples, and magnitudes that tell of another unit.
     pub fn load_recording(&self, path: &Path) -> Result<Recording, Failure> {
         let options = ReadOptions { columns: self.columns.clone(), only: None };
-        let recording = Recording::load(path, &options)?;
+        self.accept(Recording::load(path, &options)?)
+    }
+
+    /// Makes a recording ready for a comparison with the rig, wherever it came from. What is repaired or dropped stands in its notes.
+    ///
+    /// # Errors
+    /// No column that could drive or judge a replay, fewer than [`MINIMUM_SAMPLES`], and magnitudes that tell of another unit.
+    pub fn accept(&self, recording: Recording) -> Result<Recording, Failure> {
         let roles = self.roles(&recording)?;
         if !roles.outputs.iter().any(|channel| recording.channel(*channel).is_some()) {
             let names: Vec<&str> = roles.outputs.iter().map(|channel| channel.role()).collect();
@@ -137,7 +144,14 @@ impl Rig {
     /// See [`Recording::load`]; also inputs that are missing, and magnitudes that tell of another unit.
     pub fn load_inputs(&self, path: &Path) -> Result<Recording, Failure> {
         let only = Some(self.possible_inputs());
-        let recording = Recording::load(path, &ReadOptions { columns: self.columns.clone(), only })?;
+        self.accept_inputs(Recording::load(path, &ReadOptions { columns: self.columns.clone(), only })?)
+    }
+
+    /// Makes a recording ready to drive a replay of the rig, wherever it came from.
+    ///
+    /// # Errors
+    /// Inputs that are missing, and magnitudes that tell of another unit.
+    pub fn accept_inputs(&self, recording: Recording) -> Result<Recording, Failure> {
         self.roles(&recording)?;
         plausible::accept(self, recording, 1)
     }

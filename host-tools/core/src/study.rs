@@ -1,5 +1,6 @@
 //! A study: recordings of one or several benches that are diagnosed, fitted or checked together.
 
+mod assemble;
 mod file;
 mod joint;
 

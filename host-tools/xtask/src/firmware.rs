@@ -111,7 +111,8 @@ mod tests {
             .filter(|package| !default.contains(&package["id"]));
         let others: HashSet<_> = others.map(|package| package["name"].as_str().unwrap()).collect();
         let images = SOURCES.iter().map(|source| source.package);
-        let known = process::EMULATED_BOARD.into_iter().filter(|word| *word != "--package").chain(images);
+        let selected = process::EMULATED_BOARD.into_iter().chain(crate::python::CRATE);
+        let known = selected.filter(|word| *word != "--package").chain(images);
         assert_eq!(others, known.collect());
     }
 

@@ -16,6 +16,7 @@ mod paper;
 mod parts;
 mod process;
 mod prove;
+mod python;
 mod system_packages;
 mod tally;
 mod test;
@@ -25,8 +26,6 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
-
-use crate::parts::Parts;
 
 /// What is done with this workspace
 #[derive(Debug, Parser)]
@@ -41,7 +40,7 @@ enum Task {
     /// Record a simulated bench that conceals a fault and let `bowden diagnose` find it
     Demo,
     /// Run all tests, those of the board's images on the emulated board among them
-    Test(Parts),
+    Test(test::Options),
     /// Run all benchmarks: speed of model and bench, gain of the motion reconstruction, cost on the board
     Bench(bench::Options),
     /// Hide effects in simulated rigs and count how often `bowden diagnose` finds them; `prove --help` lists options
@@ -57,7 +56,7 @@ enum Task {
 fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(Cli { task: Task::Demo }) => demo::run(),
-        Ok(Cli { task: Task::Test(parts) }) => test::run(parts),
+        Ok(Cli { task: Task::Test(options) }) => test::run(options),
         Ok(Cli { task: Task::Bench(options) }) => bench::run(&options),
         Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
         Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),

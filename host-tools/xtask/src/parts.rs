@@ -19,6 +19,11 @@ impl Parts {
         self.host || !self.board
     }
 
+    /// Whether one is named.
+    pub fn is_named(self) -> bool {
+        self.host || self.board
+    }
+
     /// Whether the board's part is run.
     pub fn board(self) -> bool {
         self.board || !self.host

@@ -6,22 +6,49 @@ use std::time::{Duration, Instant};
 use crate::parts::Parts;
 use crate::process::{self, EMULATED_BOARD, built, cargo, shared};
 use crate::tally::Tally;
-use crate::{browser, cross_target, firmware, system_packages};
+use crate::{browser, cross_target, firmware, python, system_packages};
 
-/// Runs the tests; the closing lines say what has run and how it went. A part that fails does not stop the other.
+/// Which tests are run; all when no part is named.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct Options {
+    #[command(flatten)]
+    parts: Parts,
+    /// Only the Python package: its wheel is built, installed in an environment of its own and tested
+    #[arg(long)]
+    python: bool,
+}
+
+impl Options {
+    fn host(self) -> bool {
+        self.parts.host() && (self.parts.is_named() || !self.python)
+    }
+
+    fn python(self) -> bool {
+        self.python || !self.parts.is_named()
+    }
+
+    fn board(self) -> bool {
+        self.parts.board() && (self.parts.is_named() || !self.python)
+    }
+}
+
+/// Runs the tests; the closing lines say what has run and how it went. A part that fails does not stop the others.
 ///
 /// # Errors
 /// When a test fails, or a part cannot be run.
-pub fn run(parts: Parts) -> Result<(), String> {
+pub fn run(options: Options) -> Result<(), String> {
     let mut outcomes = Vec::new();
     let mut command_is_built = false;
-    if parts.host() {
+    if options.host() {
         let outcome = timed("host", host);
         // Its own tests build it, with other features of its dependencies: to build it alone takes a minute more.
         command_is_built = outcome.result.is_ok();
         outcomes.push(outcome);
     }
-    if parts.board() {
+    if options.python() {
+        outcomes.push(timed("python", || python::tests(command_is_built)));
+    }
+    if options.board() {
         outcomes.push(timed("board", || board(command_is_built)));
     }
     println!();
@@ -95,6 +122,24 @@ fn board(command_is_built: bool) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_part_that_is_named_leaves_out_the_others() {
+        use clap::Parser;
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            options: Options,
+        }
+        let run = |flags: &[&str]| {
+            let options = Line::parse_from(["test"].iter().chain(flags)).options;
+            [options.host(), options.python(), options.board()]
+        };
+        assert_eq!(run(&[]), [true; 3]);
+        assert_eq!(run(&["--host"]), [true, false, false]);
+        assert_eq!(run(&["--python"]), [false, true, false]);
+        assert_eq!(run(&["--board", "--python"]), [false, true, true]);
+    }
 
     #[test]
     fn a_closing_line_tells_part_outcome_and_time() {

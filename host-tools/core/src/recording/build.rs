@@ -120,10 +120,7 @@ impl Table {
                     if let Some(before) = self.t_s.last()
                         && t_s <= *before
                     {
-                        return Err(format!(
-                            "column `{name}`: got {t_s:?} s after {before:?} s, expected strictly increasing time; \
-                             sort the rows and drop repeated ones"
-                        ));
+                        return Err(not_increasing(name, t_s, *before));
                     }
                     self.t_s.push(t_s);
                 }
@@ -154,6 +151,48 @@ impl Table {
         }
     }
 
+    /// Adds whole columns of numbers, one for every name of the header, in place of rows. `None` is a column without numbers, which
+    /// only one that is not read may be. The error is the row, where there is one, and what a message says after the place.
+    pub(super) fn fill(&mut self, columns: &[Option<&[f64]>]) -> Result<(), (Option<usize>, String)> {
+        let rows = columns.iter().flatten().map(|values| values.len()).next().unwrap_or(0);
+        for ((values, route), name) in columns.iter().zip(&self.routes).zip(&self.names) {
+            if route.time.is_none() && route.known.is_empty() {
+                continue;
+            }
+            let values = values.ok_or_else(|| {
+                (None, format!("column `{name}`: no numbers, expected float64; convert it"))
+            })?;
+            if values.len() != rows {
+                let got = values.len();
+                let reason =
+                    format!("column `{name}`: got {got} values beside columns of {rows}; make them equal");
+                return Err((None, reason));
+            }
+            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+                let got = values[row];
+                let reason =
+                    format!("column `{name}`: got {got}, expected a finite number; fill it or drop the row");
+                return Err((Some(row), reason));
+            }
+            if let Some(source) = &route.time {
+                self.t_s = values.iter().map(|value| source.apply(*value)).collect();
+                if let Some(before) = self.t_s.windows(2).position(|pair| pair[1] <= pair[0]) {
+                    return Err((
+                        Some(before + 1),
+                        not_increasing(name, self.t_s[before + 1], self.t_s[before]),
+                    ));
+                }
+            }
+            for (column, source) in &route.known {
+                if let Column::Known { values: filled, .. } = &mut self.columns[*column] {
+                    *filled = Arc::new(values.iter().map(|value| source.apply(*value)).collect());
+                }
+            }
+        }
+        self.columns.retain(|column| matches!(column, Column::Known { .. }));
+        Ok(())
+    }
+
     /// Time and columns.
     pub(super) fn finish(mut self) -> (Vec<f64>, Vec<Column>) {
         self.t_s.shrink_to_fit();
@@ -164,6 +203,13 @@ impl Table {
         }
         (self.t_s, self.columns)
     }
+}
+
+/// What is said of time that stands still or runs backwards.
+fn not_increasing(name: &str, t_s: f64, before_s: f64) -> String {
+    format!(
+        "column `{name}`: got {t_s:?} s after {before_s:?} s, expected strictly increasing time; sort the rows and drop repeated ones"
+    )
 }
 
 /// A cell as a number.

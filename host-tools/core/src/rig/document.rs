@@ -8,7 +8,7 @@ use bowden_model::parameters::nominal;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
 
 use super::effects::CHANNEL_KEY;
-use super::{Rig, Undecided, laws, read_text, undecided};
+use super::{Rig, RigParameter, Undecided, laws, read_text, undecided};
 use crate::outcome::Failure;
 use crate::output;
 
@@ -64,6 +64,45 @@ impl RigDocument {
             .ok_or_else(|| Failure::failed(format!("{}: no {section}.{name} to change", self.source)))?;
         set_number(item, value);
         Ok(())
+    }
+
+    /// Sets any parameter that the rig has, under the name that files give it.
+    ///
+    /// # Errors
+    /// See [`RigParameter::set`]. The document is then as before.
+    pub fn set(&mut self, parameter: &RigParameter, value: f64) -> Result<(), Failure> {
+        let mut rig = self.rig()?;
+        let refuse = |reason: String| Failure::bad_input(format!("{}: {reason}", self.source));
+        parameter.set(&mut rig, value).map_err(refuse)?;
+        if let RigParameter::Effect { descriptor, .. } = parameter {
+            let changed = rig.effects.iter().find(|active| active.descriptor().id == descriptor.id);
+            return changed.map_or(Ok(()), |active| self.add_effect(active));
+        }
+        let name = parameter.to_string();
+        let item = name.split_once('.').and_then(|(section, key)| {
+            let table = self.document.get_mut(section)?.as_table_like_mut()?;
+            Some(table.entry(key).or_insert(Item::None))
+        });
+        let item = item.ok_or_else(|| Failure::failed(format!("{}: no {name} to change", self.source)))?;
+        set_number(item, value);
+        Ok(())
+    }
+
+    /// Takes an effect out of the simulation, all instances of it, or with `"law"` all laws; says whether there was one.
+    pub fn remove_effect(&mut self, id: &str) -> bool {
+        if id == laws::KEY {
+            return self.document.remove(laws::KEY).is_some();
+        }
+        let simulation = self.document.get_mut("simulation").and_then(Item::as_table_like_mut);
+        let list = simulation.and_then(|table| table.get_mut("effects")).and_then(Item::as_array_mut);
+        let Some(list) = list else { return false };
+        let before = list.len();
+        list.retain(|listed| listed.as_str() != Some(id));
+        let removed = list.len() < before;
+        if let Some(effects) = self.document.get_mut("effects").and_then(Item::as_table_like_mut) {
+            effects.remove(id);
+        }
+        removed
     }
 
     /// Adds an effect or a law, or replaces the parameters of the same one on the same sensor.

@@ -1,0 +1,77 @@
+"""Finds which physics a simulated tendon-driven joint lacks, from recordings of the real one.
+
+```python
+import bowden
+
+d = bowden.diagnose(["train.csv"], rig="rig.toml", heldout=["other.csv"])
+d.verdict  # "missing_physics"
+d.effects[0].id, d.effects[0].probability, d.effects[0].parameters
+d.report("report.html")
+bowden.replay("other.csv", d.rig)["theta_out_rad"]  # numpy, rad
+```
+
+SI units throughout; the unit is in the name. `bowden.plots` draws with matplotlib.
+"""
+
+from bowden.diagnosis import Diagnosis, Trace
+from bowden.errors import Error, InputError, RepairedWarning, StoppedEarlyWarning
+from bowden.recording import UNITS, Frame, Recording, RecordingLike
+from bowden.results import (
+    ChannelError,
+    ChannelFit,
+    Effect,
+    Estimate,
+    FittedParameter,
+    FreeForm,
+    HeldOutLoss,
+    Law,
+    MapAxis,
+    MapChannel,
+    Mismatch,
+    Recalibrated,
+    ResidualMap,
+    Rival,
+    Unexplained,
+)
+from bowden.rig import Rig, RigLike
+from bowden.study import Study, StudyRecording
+from bowden.work import Fit, Motion, ProgressLike, diagnose, fit, replay, simulate
+
+__all__ = [
+    "UNITS",
+    "ChannelError",
+    "ChannelFit",
+    "Diagnosis",
+    "Effect",
+    "Error",
+    "Estimate",
+    "Fit",
+    "FittedParameter",
+    "Frame",
+    "FreeForm",
+    "HeldOutLoss",
+    "InputError",
+    "Law",
+    "MapAxis",
+    "MapChannel",
+    "Mismatch",
+    "Motion",
+    "ProgressLike",
+    "Recalibrated",
+    "Recording",
+    "RecordingLike",
+    "RepairedWarning",
+    "ResidualMap",
+    "Rig",
+    "RigLike",
+    "Rival",
+    "StoppedEarlyWarning",
+    "Study",
+    "StudyRecording",
+    "Trace",
+    "Unexplained",
+    "diagnose",
+    "fit",
+    "replay",
+    "simulate",
+]

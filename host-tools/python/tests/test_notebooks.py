@@ -1,0 +1,46 @@
+"""The notebooks run from top to bottom, find what they say, and show their pictures."""
+
+import os
+from pathlib import Path
+
+import nbclient
+import nbformat
+import pytest
+
+NOTEBOOKS = Path(__file__).resolve().parents[1] / "notebooks"
+
+
+def _run(name: str, folder: Path) -> nbformat.NotebookNode:
+    notebook = nbformat.read(NOTEBOOKS / name, as_version=4)
+    client = nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": NOTEBOOKS}})
+    client.execute()
+    # Whoever changes a notebook finds it here with its pictures.
+    nbformat.write(notebook, Path(os.environ.get("BOWDEN_NOTEBOOKS", folder)) / name)
+    return notebook
+
+
+def _pictures(notebook: nbformat.NotebookNode) -> int:
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    return sum("image/png" in output.get("data", {}) for output in outputs)
+
+
+def _text(notebook: nbformat.NotebookNode) -> str:
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    return "\n".join(output.get("text", "") + "".join(output.get("data", {}).get("text/markdown", "")) for output in outputs)
+
+
+def test_the_servo_lacks_friction_that_grows_with_load(tmp_path):
+    notebook = _run("servo.ipynb", tmp_path)
+    assert _pictures(notebook) == 5
+    assert "gear_load_friction" in _text(notebook)
+
+
+def test_a_drag_that_no_catalogue_lists_becomes_its_formula(virtual_bench, tmp_path):
+    notebook = _run("law.ipynb", tmp_path)
+    assert _pictures(notebook) == 3
+    assert "joint_friction_nm = amplitude_nm * abs(omega_out_rad_s)^exponent" in _text(notebook)
+
+
+@pytest.mark.parametrize("name", ["servo.ipynb", "law.ipynb"])
+def test_committed_notebooks_show_their_pictures(name):
+    assert _pictures(nbformat.read(NOTEBOOKS / name, as_version=4)) >= 3

@@ -1,0 +1,155 @@
+"""Simulation, replay, fit and diagnosis from Python, against the command and against each other."""
+
+import json
+import os
+import signal
+import subprocess
+import threading
+import warnings
+
+import numpy as np
+import pytest
+
+import bowden
+
+
+def test_python_and_shell_get_the_same_diagnosis(servo, bowden_command, tmp_path):
+    subprocess.run([bowden_command, "diagnose", servo, "--out", tmp_path / "shell", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    d = bowden.diagnose(servo, progress=False)
+    assert d.save(tmp_path / "python") == tmp_path / "python/report.html"
+    files = sorted(path.name for path in (tmp_path / "shell").iterdir())
+    assert files == sorted(path.name for path in (tmp_path / "python").iterdir())
+    for name in files:
+        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    assert (d.verdict, d.effects[0].id, d.complete) == ("missing_physics", "gear_load_friction", True)
+    said = json.loads((tmp_path / "shell/diagnosis.json").read_text())
+    assert d.to_dict() == said
+    assert d.effects[0].parameters["coefficient"].value == said["effects"][0]["parameters"]["coefficient"]["value"]
+    assert d.channels["theta_out_rad"].after_rmse < 0.3 * d.channels["theta_out_rad"].before_rmse
+    assert d.rig["effects.gear_load_friction.coefficient"] == d.effects[0].parameters["coefficient"].value
+    assert d.report(tmp_path / "again.html").read_bytes() == (tmp_path / "shell/report.html").read_bytes()
+
+
+def test_play_is_found_and_the_diagnosed_rig_replays_a_recording_better(play, play_diagnosis):
+    d = play_diagnosis
+    assert [effect.id for effect in d.effects] == ["joint_backlash"]
+    assert d.effects[0].probability > 0.9
+    measured = bowden.Recording.load(play / "heldout.csv")
+    before, after = (bowden.replay(measured, rig) for rig in (play / "rig.toml", d.rig))
+    rms = [float(np.sqrt(np.mean((measured["theta_out_rad"] - of["theta_out_rad"]) ** 2))) for of in (before, after)]
+    assert rms[1] < 0.5 * rms[0]
+    assert d.traces["theta_out_rad"].measured.shape == d.traces["theta_out_rad"].t_s.shape
+
+
+def test_a_fit_finds_the_friction_that_was_simulated(recording, rig):
+    fitted = bowden.fit(recording.to_pandas(), rig, progress=False)
+    friction = {parameter.parameter: parameter for parameter in fitted.parameters}["sheath.friction_coefficient"]
+    assert friction.nominal == rig["sheath.friction_coefficient"]
+    assert friction.fitted == pytest.approx(0.15, rel=0.03)
+    assert fitted.rig["sheath.friction_coefficient"] == friction.fitted
+    assert all(channel.after_rmse <= channel.before_rmse * 1.01 for channel in fitted.channels if channel.unit == "N")
+
+
+def test_a_simulation_follows_its_arguments(rig):
+    one, same, other = (bowden.simulate(rig, motion="sine", seconds=2.0, seed=seed) for seed in (1, 1, 2))
+    assert np.array_equal(one["f1_n"], same["f1_n"]) and not np.array_equal(one["f1_n"], other["f1_n"])
+    t_s = np.linspace(0.0, 3.0, 301)
+    along = bowden.simulate(rig, reference=(t_s, 0.2 * np.sin(t_s) ** 2), rate_hz=100.0)
+    assert along["theta_ref_rad"] == pytest.approx(0.2 * np.sin(along.t_s) ** 2, abs=1e-4)
+    for wrong in ({"seconds": 0.0}, {"rate_hz": 1e9}, {"seed": -1}, {"motion": "dance"}):
+        with pytest.raises(bowden.InputError):
+            bowden.simulate(rig, **wrong)
+
+
+def test_a_study_made_in_python_equals_the_one_of_a_file(servo):
+    listed = bowden.Study.load(servo)
+    made = bowden.Study(listed.name)
+    made.add_bench("xl330", listed.benches["xl330"])
+    gains = {"kp100": None, "kp200": 0.575476, "kp400": 1.150951, "kp800": 2.301902}
+    for one in listed.recordings:
+        gain = next(value for name, value in gains.items() if name in one.recording.source)
+        changed = {} if gain is None else {"controller.gain_duty_per_rad": gain}
+        made.add_recording(one.recording.source, heldout=one.heldout, set=changed)
+    one, other = (bowden.fit(study, progress=False) for study in (listed, made))
+    assert one == other
+    assert {parameter.parameter for parameter in one.parameters} >= {"load.mass_kg"}
+
+
+def test_mistakes_in_what_is_asked_for_are_refused(recording, rig, servo):
+    study = bowden.Study("two")
+    study.add_bench("left", rig)
+    study.add_bench("right", rig)
+    for wrong in (
+        lambda: bowden.diagnose(recording),
+        lambda: bowden.diagnose(recording, rig, heldout=recording),
+        lambda: bowden.diagnose(servo, rig),
+        lambda: bowden.diagnose(7, rig),
+        lambda: bowden.diagnose([7], rig),
+        lambda: bowden.diagnose(recording, rig, jobs=0),
+        lambda: study.add_recording(recording),
+        lambda: study.add_recording(recording, bench="third"),
+        lambda: bowden.diagnose(study),
+        lambda: bowden.Study.load(servo).add_bench("x", rig),
+    ):
+        with pytest.raises((bowden.InputError, TypeError)) as raised:
+            wrong()
+        assert str(raised.value)
+
+
+def test_repaired_recordings_are_warned_of(recording, rig):
+    arrays = {name: values.copy() for name, values in recording.to_arrays().items()}
+    arrays["theta_out_rad"][1500] += 1.0
+    with pytest.warns(bowden.RepairedWarning, match="set aside"):
+        bowden.fit(arrays, rig, progress=False)
+
+
+def test_ctrl_c_ends_a_diagnosis_with_what_there_is(play):
+    stages = []
+
+    def watch(stage: str, done: int, steps: int) -> None:
+        if stage == "fitting effects" and stage not in stages:
+            # From another thread, as a terminal would: the main thread waits for the work.
+            threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
+        stages.append(stage)
+
+    with pytest.warns(bowden.StoppedEarlyWarning):
+        d = bowden.diagnose(play / "train.csv", play / "rig.toml", progress=watch)
+    assert not d.complete and d.verdict and d.rig.text
+    assert "screening effects" in stages
+
+
+def test_an_exception_in_a_watcher_ends_the_work_and_is_raised(play):
+    def watch(stage: str, done: int, steps: int) -> None:
+        raise RuntimeError("no more")
+
+    with pytest.raises(RuntimeError, match="no more"):
+        bowden.diagnose(play / "train.csv", play / "rig.toml", progress=watch)
+
+
+def test_other_threads_go_on_while_work_runs(play):
+    counted, over = [0], threading.Event()
+
+    def count() -> None:
+        while not over.wait(0.001):
+            counted[0] += 1
+
+    thread = threading.Thread(target=count)
+    seen = []
+    thread.start()
+    try:
+        bowden.fit(play / "train.csv", play / "rig.toml", progress=lambda *_: seen.append(counted[0]))
+    finally:
+        over.set()
+        thread.join()
+    # Without the lock released no other thread gets a turn between two calls of the watcher.
+    assert len(set(seen)) > 1 and counted[0] > 10
+
+
+def test_progress_shows_a_bar_and_no_progress_shows_nothing(recording, rig, capfd):
+    bowden.fit(recording, rig, progress=False)
+    assert capfd.readouterr().err == ""
+    with warnings.catch_warnings():
+        # Outside a notebook tqdm.auto takes the bar for terminals and says that ipywidgets could be there.
+        warnings.simplefilter("ignore")
+        bowden.diagnose(recording, rig, progress=True)
+    assert "%" in capfd.readouterr().err

@@ -1,0 +1,168 @@
+//! The Python package: an environment of its own below the target folder, its wheel, its tests.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::process::{self, built, cargo, find_program, target_folder, workspace};
+
+/// Package and crate, below the workspace.
+const PACKAGE: &str = "host-tools/python";
+
+/// Selects the crate: only Python loads it, so it is no default member of the workspace.
+pub const CRATE: [&str; 2] = ["--package", "bowden-python"];
+
+/// The interpreter: `PYTHON`, or `python3`. `Err` says why there is none that would do.
+///
+/// # Errors
+/// None is there, or it is older than 3.11.
+pub fn interpreter() -> Result<PathBuf, String> {
+    let named = std::env::var_os("PYTHON").map(PathBuf::from);
+    let path = named.or_else(|| find_program("python3")).ok_or("no python3; install Python 3.11 or newer")?;
+    let version = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))";
+    process::output(Command::new(&path).args(["-c", version]))
+        .map(|_| path.clone())
+        .map_err(|_| format!("{} is older than 3.11 or has no venv; name another in PYTHON", path.display()))
+}
+
+/// Builds the wheel, installs it and runs pytest; `programs_are_built` says whether the tests of the host have built what these tests run.
+///
+/// # Errors
+/// When a package cannot be installed, the wheel does not build, or a test fails.
+pub fn tests(programs_are_built: bool) -> Result<String, String> {
+    let interpreter = match interpreter() {
+        Ok(interpreter) => interpreter,
+        Err(reason) => return Ok(format!("skipped: {reason}")),
+    };
+    let folder = target_folder()?.join("python");
+    let environment = environment(&interpreter, &folder)?;
+    if !programs_are_built {
+        process::run(&mut cargo(&["build", "--package", "bowden", "--package", "virtual-bench"]), &[0])?;
+    }
+    install_wheel(&environment, &folder)?;
+
+    let counts = folder.join("tests.xml");
+    let notebooks = folder.join("notebooks");
+    fs::create_dir_all(&notebooks).map_err(|error| format!("{}: {error}", notebooks.display()))?;
+    let mut pytest = Command::new(program(&environment, "python"));
+    pytest.current_dir(workspace().join(PACKAGE)).args(["-m", "pytest", "-rs", "--junit-xml"]).arg(&counts);
+    pytest
+        .env("BOWDEN_BIN", built("debug", "bowden")?)
+        .env("VIRTUAL_BENCH", built("debug", "virtual-bench")?);
+    pytest.env("BOWDEN_NOTEBOOKS", &notebooks).env("MPLBACKEND", "agg").env("PYTHONDONTWRITEBYTECODE", "1");
+    let ended = process::run(&mut pytest, &[0]);
+    let said = fs::read_to_string(&counts).map_err(|error| format!("{}: {error}", counts.display()))?;
+    let counts = Counts::read(&said).ok_or_else(|| format!("{}: no counts of tests", counts.display()))?;
+    match ended {
+        Ok(()) if counts.passed() == 0 => Err("no test has run".to_owned()),
+        Ok(()) => Ok(counts.to_string()),
+        Err(_) => Err(counts.to_string()),
+    }
+}
+
+/// The environment with the pinned packages, made anew when these have changed.
+fn environment(interpreter: &Path, folder: &Path) -> Result<PathBuf, String> {
+    let requirements = workspace().join(PACKAGE).join("requirements.txt");
+    let wanted = fs::read(&requirements).map_err(|error| format!("{}: {error}", requirements.display()))?;
+    let environment = folder.join("environment");
+    let installed = environment.join("requirements.txt");
+    if fs::read(&installed).is_ok_and(|there| there == wanted) {
+        return Ok(environment);
+    }
+    println!("Python environment: installing the packages of {}", requirements.display());
+    process::run(Command::new(interpreter).args(["-m", "venv", "--clear"]).arg(&environment), &[0])?;
+    let mut pip = pip(&environment);
+    pip.args(["install", "--quiet", "--only-binary", ":all:", "--requirement"]).arg(&requirements);
+    process::run(&mut pip, &[0])?;
+    fs::write(&installed, wanted).map_err(|error| format!("{}: {error}", installed.display()))?;
+    Ok(environment)
+}
+
+/// Builds the wheel and installs it. With the profile of the tests: what `pip install` builds for users is the same, optimised further.
+fn install_wheel(environment: &Path, folder: &Path) -> Result<(), String> {
+    let wheels = folder.join("wheels");
+    // Of an earlier version nothing may be left that could be installed instead.
+    let _ = fs::remove_dir_all(&wheels);
+    let mut maturin = Command::new(program(environment, "maturin"));
+    maturin.current_dir(workspace()).args(["build", "--profile", "dev", "--locked", "--manifest-path"]);
+    maturin.arg(format!("{PACKAGE}/Cargo.toml")).arg("--out").arg(&wheels);
+    maturin.arg("--interpreter").arg(program(environment, "python"));
+    process::run(&mut maturin, &[0])?;
+    let entries = fs::read_dir(&wheels).map_err(|error| format!("{}: {error}", wheels.display()))?;
+    let wheel =
+        entries.flatten().map(|entry| entry.path()).find(|path| path.extension().is_some_and(|e| e == "whl"));
+    let wheel = wheel.ok_or_else(|| format!("{}: no wheel after the build", wheels.display()))?;
+    println!("wheel: {}", wheel.display());
+    let mut pip = pip(environment);
+    pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(&wheel);
+    process::run(&mut pip, &[0])
+}
+
+fn pip(environment: &Path) -> Command {
+    let mut pip = Command::new(program(environment, "python"));
+    pip.args(["-m", "pip", "--disable-pip-version-check"]);
+    pip
+}
+
+/// A program of the environment.
+fn program(environment: &Path, name: &str) -> PathBuf {
+    let folder = if cfg!(windows) { "Scripts" } else { "bin" };
+    environment.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// What became of the tests, from the file that pytest writes.
+#[derive(Debug, PartialEq, Eq)]
+struct Counts {
+    run: u32,
+    failed: u32,
+    skipped: u32,
+}
+
+impl Counts {
+    fn read(xml: &str) -> Option<Self> {
+        let suite = xml.split_once("<testsuite ")?.1;
+        let suite = suite.split_once('>')?.0;
+        let count = |name: &str| -> Option<u32> {
+            let value = suite.split_once(&format!("{name}=\""))?.1;
+            value.split_once('"')?.0.parse().ok()
+        };
+        Some(Self {
+            run: count(" tests")?,
+            failed: count(" failures")? + count(" errors").or_else(|| count("errors"))?,
+            skipped: count(" skipped")?,
+        })
+    }
+
+    const fn passed(&self) -> u32 {
+        self.run.saturating_sub(self.failed).saturating_sub(self.skipped)
+    }
+}
+
+impl std::fmt::Display for Counts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.failed > 0 {
+            write!(f, "{} tests failed, ", self.failed)?;
+        }
+        write!(f, "{} tests passed", self.passed())?;
+        if self.skipped > 0 {
+            write!(f, ", {} skipped", self.skipped)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_those_of_the_suite() {
+        let xml = "<?xml version=\"1.0\"?><testsuites name=\"pytest tests\"><testsuite name=\"pytest\" errors=\"1\" failures=\"2\" \
+                   skipped=\"3\" tests=\"40\" time=\"1.5\"><testcase name=\"a\" tests=\"9\" /></testsuite></testsuites>";
+        let counts = Counts::read(xml).unwrap();
+        assert_eq!(counts, Counts { run: 40, failed: 3, skipped: 3 });
+        assert_eq!(counts.to_string(), "3 tests failed, 34 tests passed, 3 skipped");
+        assert_eq!(Counts { run: 5, failed: 0, skipped: 0 }.to_string(), "5 tests passed");
+        assert_eq!(Counts::read("<nothing/>"), None);
+    }
+}
