@@ -52,6 +52,8 @@ enum Command {
     Effect(crate::commands::effect::EffectArguments),
     /// Run the joint on a driver board along a reference and record every control tick
     Record(crate::commands::record::RecordArguments),
+    /// Show the joint on a driver board live, let it move by keys, and record meanwhile
+    Monitor(crate::commands::monitor::MonitorArguments),
     /// Excite, diagnose, correct and verify the joint on a driver board, all in one
     Investigate(crate::commands::investigate::InvestigateArguments),
     /// Show, change, load, save and store the parameters of a driver board
@@ -100,6 +102,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Simulate(arguments) => arguments.run(),
         Command::Effect(arguments) => arguments.run(),
         Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Monitor(arguments) => arguments.run(),
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),
         Command::Faults(arguments) => arguments.run(),

@@ -9,6 +9,7 @@ pub mod faults;
 pub mod fit;
 pub mod investigate;
 mod limits;
+pub mod monitor;
 pub mod params;
 mod port;
 pub mod record;

@@ -5,4 +5,5 @@
 pub mod cli;
 pub mod commands;
 pub mod interrupt;
+pub mod monitor;
 pub mod progress;

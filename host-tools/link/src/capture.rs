@@ -39,18 +39,11 @@ pub struct Capture<'c> {
 }
 
 impl Capture<'_> {
-    /// From ready: runs along the course and writes the recording. It is kept whatever ended the run, unless it is empty.
+    /// Opens the file, for ticks of a board with these parameters.
     ///
     /// # Errors
-    /// When the medium refuses, or the run ended before its first sample.
-    pub fn run(
-        &self,
-        session: &mut Session,
-        course: &Course,
-        stop: Stop,
-        progress: &dyn Progress,
-    ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
-        let parameters = session.parameters();
+    /// When the medium refuses, or the board lacks a parameter that samples are converted with.
+    pub fn recorder(&self, parameters: &ParameterSet) -> Result<Recorder, Failure> {
         let mut metadata = Metadata::default();
         metadata.extend(METADATA, parameters.metadata());
         let beside = match self.format {
@@ -70,7 +63,21 @@ impl Capture<'_> {
             let (out, reason) = (self.out.display(), output::describe(&error));
             Failure::failed(format!("{out}: cannot be written: {reason}; choose another place"))
         })?;
-        let mut recorder = Recorder::new(file, form, self.out);
+        Ok(Recorder::new(file, form, self.out))
+    }
+
+    /// From ready: runs along the course and writes the recording. It is kept whatever ended the run, unless it is empty.
+    ///
+    /// # Errors
+    /// When the medium refuses, or the run ended before its first sample.
+    pub fn run(
+        &self,
+        session: &mut Session,
+        course: &Course,
+        stop: Stop,
+        progress: &dyn Progress,
+    ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
+        let mut recorder = self.recorder(session.parameters())?;
         let mut shown = 0;
         let end = session.run(self.mode, course, stop, &mut |tick| {
             if !recorder.tick(tick) {

@@ -21,6 +21,7 @@ use bowden_link::message::{
 use bowden_link::{Answer, Batch, FromBoard, PROTOCOL_VERSION, Request, SCHEMA, Sample, State, ToBoard};
 
 use super::error::{CommsError, LinkError};
+use super::hub::{Hub, Live};
 use super::losses::{Losses, Place};
 use super::transport::Transport;
 
@@ -64,6 +65,8 @@ struct Wire {
     telemetry: VecDeque<Telemetry>,
     /// Telemetry is wanted; what comes otherwise was asked for by another program.
     listening: bool,
+    /// Where telemetry is published as well.
+    hub: Option<Hub>,
     losses: Losses,
     restarted: Option<(u32, u32)>,
 }
@@ -86,6 +89,7 @@ impl Client {
             answers: 0,
             telemetry: VecDeque::new(),
             listening: false,
+            hub: None,
             losses: Losses::default(),
             restarted: None,
         };
@@ -166,6 +170,11 @@ impl Client {
     /// Answers that came since the greeting.
     pub fn answers(&self) -> u64 {
         self.wire.answers
+    }
+
+    /// From now on hands telemetry to the readers of a hub as well.
+    pub fn publish_to(&mut self, hub: Hub) {
+        self.wire.hub = Some(hub);
     }
 
     /// The oldest batch that was not taken yet.
@@ -502,7 +511,7 @@ impl Wire {
             match frame.message {
                 FromBoard::Telemetry(_) if !self.listening => {}
                 FromBoard::Telemetry(batch) => match self.losses.batch(&batch) {
-                    Place::At(first_tick) => self.telemetry.push_back(Telemetry { first_tick, batch }),
+                    Place::At(first_tick) => self.keep(Telemetry { first_tick, batch }),
                     Place::Late => {}
                     Place::Restarted { expected } => {
                         self.restarted = Some((batch.first_tick, expected.wrapping_sub(1)));
@@ -517,6 +526,14 @@ impl Wire {
             }
         }
         wanted
+    }
+
+    fn keep(&mut self, telemetry: Telemetry) {
+        if let Some(hub) = &self.hub {
+            let (telemetry, losses) = (telemetry.clone(), self.losses);
+            hub.publish(Live { telemetry, losses, heard_bytes: self.heard_bytes });
+        }
+        self.telemetry.push_back(telemetry);
     }
 }
 

@@ -98,6 +98,21 @@ impl Conversion {
         direction * (f64::from(count) - zero) * TAU / COUNTS_PER_TURN
     }
 
+    /// Duty, 1 at most; positive drives towards +θ.
+    pub fn duty(&self, sample: &Sample) -> f64 {
+        self.bridge_direction * (f64::from(sample.duty_raw) / FULL_DUTY)
+    }
+
+    /// Current of the motor, A; positive drives towards +θ.
+    pub fn current_a(&self, sample: &Sample) -> f64 {
+        self.bridge_direction * self.current.apply(sample.current_raw)
+    }
+
+    /// Reference, rad or, in torque mode, N·m.
+    pub fn reference(sample: &Sample) -> f64 {
+        f64::from(sample.reference_raw) / STEPS
+    }
+
     /// Voltage of the bus, V.
     pub fn bus_v(&self, sample: &Sample) -> f64 {
         self.bus.apply(sample.bus_raw)
@@ -107,10 +122,9 @@ impl Conversion {
     pub fn cells(&self, sample: &Sample, mode: Option<Mode>) -> impl Iterator<Item = Cell<'static>> {
         let number = |value: f64| Cell::Number((value * ROUNDING).round() / ROUNDING);
         let whole = |value: i64| Cell::Integer(value);
-        let reference = mode.map(|_| number(f64::from(sample.reference_raw) / STEPS));
+        let reference = mode.map(|_| number(Self::reference(sample)));
         let [f1, f2, f3, f4] = sample.tension_raw;
         let tension = |channel: usize, code| number(self.tension[channel].apply(code));
-        let duty = f64::from(sample.duty_raw) / FULL_DUTY;
         let cells = [
             number(self.angle_rad(0, sample.encoder_count_raw[0])),
             number(self.angle_rad(1, sample.encoder_count_raw[1])),
@@ -118,9 +132,9 @@ impl Conversion {
             tension(1, f2),
             tension(2, f3),
             tension(3, f4),
-            number(self.bridge_direction * duty),
+            number(self.duty(sample)),
             number(self.bus_v(sample)),
-            number(self.bridge_direction * self.current.apply(sample.current_raw)),
+            number(self.current_a(sample)),
             Cell::Integer(i64::from(sample.state.drives())),
             number(f64::from(sample.command_raw) / STEPS),
             whole(sample.encoder_count_raw[0].into()),

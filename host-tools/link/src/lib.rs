@@ -2,13 +2,15 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`transport`] | bytes and a clock: [`serial`] port or [`sim`]ulated board |
+//! | [`transport`] | bytes and a clock: [`serial`] port or [`sim`]ulated board, [`paced`] for those who watch it |
 //! | [`client`] | one method a request, over any transport |
 //! | [`error`], [`losses`] | what goes wrong, and what gets lost |
 //! | [`parameters`] | the board's parameters by name, to and from a file |
 //! | [`from_rig`] | the board's parameters from what a fit or a diagnosis found |
 //! | [`ripple_table`] | the board's ripple table, to and from a file |
+//! | [`hub`] | live samples for several readers |
 //! | [`session`] | from off to a running reference and back to off |
+//! | [`operator`] | a joint with somebody at the keys |
 //! | [`course`] | what the joint is to follow |
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
@@ -21,8 +23,11 @@ pub mod conversion;
 pub mod course;
 pub mod error;
 pub mod from_rig;
+pub mod hub;
 pub mod investigate;
 pub mod losses;
+pub mod operator;
+pub mod paced;
 pub mod parameters;
 pub mod recorder;
 pub mod rig_file;
@@ -60,17 +65,39 @@ const SIM_CONCEALS: &str = "sim:";
 pub const AUTO: &str = "auto";
 
 /// Opens a port and greets the board: a serial port, [`AUTO`], or [`SIM`] with what the simulated joint conceals behind a colon.
-/// An answer of the board is waited for as long as `timeout`.
+/// An answer of the board is waited for as long as `timeout`. A simulated board runs as fast as it can.
 ///
 /// # Errors
 /// See [`serial::SerialTransport::open`], [`serial::find`], [`sim::Concealed::parse`] and [`Client::connect`].
 pub fn connect(port: &str, timeout: Duration) -> Result<Client, LinkError> {
-    if let Some(list) = port.strip_prefix(SIM_CONCEALS) {
-        let transport = sim::SimTransport::with(&sim::Concealed::parse(list)?)?;
-        return Client::connect(Box::new(transport), SIM, timeout);
+    match simulated(port)? {
+        Some(board) => Client::connect(Box::new(board), SIM, timeout),
+        None => connect_serial(port, timeout),
     }
+}
+
+/// As [`connect`], but a simulated board runs in real time.
+///
+/// # Errors
+/// As [`connect`].
+pub fn connect_live(port: &str, timeout: Duration) -> Result<Client, LinkError> {
+    match simulated(port)? {
+        Some(board) => Client::connect(Box::new(paced::Paced::new(board)), SIM, timeout),
+        None => connect_serial(port, timeout),
+    }
+}
+
+/// The simulated board that `port` names, if it names one.
+fn simulated(port: &str) -> Result<Option<sim::SimTransport>, LinkError> {
+    if port == SIM {
+        return Ok(Some(sim::SimTransport::new()));
+    }
+    let Some(list) = port.strip_prefix(SIM_CONCEALS) else { return Ok(None) };
+    Ok(Some(sim::SimTransport::with(&sim::Concealed::parse(list)?)?))
+}
+
+fn connect_serial(port: &str, timeout: Duration) -> Result<Client, LinkError> {
     let (transport, name): (Box<dyn Transport>, String) = match port {
-        SIM => (Box::new(sim::SimTransport::new()), SIM.to_owned()),
         AUTO => {
             let path = serial::find()?;
             (Box::new(serial::SerialTransport::open(&path)?), path)

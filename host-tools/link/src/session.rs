@@ -14,6 +14,7 @@ use bowden_link::{FaultRecord, Sample, State};
 use super::client::Client;
 use super::course::{Course, Track};
 use super::error::{CommsError, LinkError};
+use super::hub::Hub;
 use super::parameters::ParameterSet;
 
 /// Ticks after a confirmed order until the state shows that it was taken up.
@@ -47,6 +48,10 @@ pub struct Session {
     alive_interval: Duration,
     said_alive: Duration,
     driving: bool,
+    /// Telemetry is on in every state.
+    watched: bool,
+    /// When telemetry came last that nobody takes here, and its tick.
+    passed: (Duration, u32),
 }
 
 /// How a run ended.
@@ -84,7 +89,8 @@ impl Session {
         let alive_interval = Duration::from_secs_f64(timeout_s.clamp(0.0, 60.0) / 5.0).min(ALIVE_INTERVAL);
         let said_alive = client.now();
         client.hurry(alive_interval);
-        Ok(Self { client, parameters, alive_interval, said_alive, driving: false })
+        let (driving, watched, passed) = (false, false, (said_alive, 0));
+        Ok(Self { client, parameters, alive_interval, said_alive, driving, watched, passed })
     }
 
     /// The board.
@@ -105,6 +111,44 @@ impl Session {
         self.parameters.replace(&mut self.client, values)?;
         self.parameters = ParameterSet::read(&mut self.client)?;
         Ok(())
+    }
+
+    /// From now on the board sends telemetry in every state, not in run alone; all of it goes to the hub.
+    ///
+    /// # Errors
+    /// When the board does not answer.
+    pub fn watch(&mut self, hub: Hub) -> Result<(), LinkError> {
+        self.client.publish_to(hub);
+        self.watched = true;
+        self.passed = (self.client.now(), self.client.status()?.tick);
+        self.client.switch_telemetry(true)
+    }
+
+    /// Waits up to `timeout` for something from the board, without an order to it.
+    ///
+    /// # Errors
+    /// When the link breaks, control ticks stand still, or the board started again.
+    pub fn idle(&mut self, timeout: Duration) -> Result<(), LinkError> {
+        self.client.listen(timeout.min(self.alive_interval))?;
+        self.pass_over();
+        self.say_alive()?;
+        let (heard, last_tick) = self.passed;
+        if self.watched && self.client.now().saturating_sub(heard) > self.client.timeout() {
+            match self.telemetry_is_missing(last_tick) {
+                Ok(tick) => self.passed = (self.client.now(), tick),
+                // A fault by itself is no reason for silence.
+                Err(LinkError::Fault(_)) => self.client.switch_telemetry(true)?,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// Drops telemetry that nobody takes here; the hub has had it.
+    fn pass_over(&mut self) {
+        while let Some(telemetry) = self.client.telemetry() {
+            self.passed = (self.client.now(), telemetry.batch.first_tick);
+        }
     }
 
     /// Brings the board from where it is to ready: self test and pretension check. A joint that moves is stopped first.
@@ -164,9 +208,15 @@ impl Session {
         sink: &mut dyn FnMut(&RunTick) -> ControlFlow<()>,
     ) -> Result<RunEnd, LinkError> {
         self.driving = true;
-        self.client.switch_telemetry(true)?;
+        if self.watched {
+            // What comes from now on is younger than the state ready.
+            self.pass_over();
+        } else {
+            self.client.switch_telemetry(true)?;
+        }
         let result = self.follow(mode, course, stop, sink);
-        let off = self.off().and_then(|()| self.client.switch_telemetry(false));
+        let off =
+            self.off().and_then(|()| if self.watched { Ok(()) } else { self.client.switch_telemetry(false) });
         match result {
             Ok(end) => off.map(|()| end),
             Err(error) => Err(error),
@@ -296,6 +346,7 @@ impl Session {
             while self.client.now() < look_again {
                 let left = look_again.saturating_sub(self.client.now());
                 self.client.listen(left)?;
+                self.pass_over();
             }
         }
     }

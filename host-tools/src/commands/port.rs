@@ -24,6 +24,14 @@ impl PortArguments {
     pub fn connect(&self) -> Result<Client, LinkError> {
         bowden_host_link::connect(&self.port, self.timeout)
     }
+
+    /// The same; a simulated board then runs in real time.
+    ///
+    /// # Errors
+    /// See [`bowden_host_link::connect_live`].
+    pub fn connect_live(&self) -> Result<Client, LinkError> {
+        bowden_host_link::connect_live(&self.port, self.timeout)
+    }
 }
 
 fn timeout(text: &str) -> Result<Duration, String> {

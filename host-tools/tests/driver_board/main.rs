@@ -10,9 +10,12 @@ mod cuts;
 mod fake;
 mod from_rig;
 mod mishaps;
+mod monitor;
 mod ports;
 mod pseudo_terminal;
 mod ripple_table;
+#[path = "../common/screen.rs"]
+mod screen;
 mod session;
 mod simulated;
 mod terminal;

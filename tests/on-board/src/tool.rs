@@ -65,19 +65,19 @@ impl Plugged {
         Ok(Self { board, terminal })
     }
 
+    /// Arguments of `bowden` that begin a command with this board: `<command> --port <terminal> --timeout 600`.
+    pub fn arguments(&self, command: &str) -> [String; 5] {
+        let port = self.terminal.path().to_string_lossy().into_owned();
+        [command.to_owned(), "--port".to_owned(), port, "--timeout".to_owned(), ANSWER_LIMIT_S.to_owned()]
+    }
+
     /// Runs `bowden <command> --port <terminal> --timeout 600 <arguments>` while the board runs.
-    ///
-    /// Neither side depends on how fast this machine is: the board stands still while the terminal has no room for its bytes, and
-    /// [`TIME_PER_REQUEST_S`] after the last request of the tool. A slow tool is therefore never silent and loses no sample.
     pub fn run(&mut self, command: &str, arguments: &[&str]) -> Outcome<Ran> {
         let path = tool()?;
         let what = format!("{} {command} {}", path.display(), arguments.join(" "));
         let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
         let child = Command::new(&path)
-            .arg(command)
-            .arg("--port")
-            .arg(self.terminal.path())
-            .args(["--timeout", ANSWER_LIMIT_S])
+            .args(self.arguments(command))
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -86,10 +86,22 @@ impl Plugged {
             .map_err(failed)?;
         // Another thread reads what it prints, so that it never waits for us.
         let waiting = std::thread::spawn(move || child.wait_with_output());
+        self.attend(&what, || waiting.is_finished())?;
+        let output = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
+        let output = output.map_err(failed)?;
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        Ok(Ran { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) })
+    }
+
+    /// Lets the board run with its port on the terminal until `is_done`.
+    ///
+    /// Neither side depends on how fast this machine is: the board stands still while the terminal has no room for its bytes, and
+    /// [`TIME_PER_REQUEST_S`] after the last request of the tool. A slow tool is therefore never silent and loses no sample.
+    pub fn attend(&mut self, what: &str, mut is_done: impl FnMut() -> bool) -> Outcome {
         let end_s = self.board.time_s() + LIMIT_S;
         let mut allowed_until_s = self.board.time_s();
         let mut heard = Instant::now();
-        while !waiting.is_finished() {
+        while !is_done() {
             if self.terminal.exchange(&mut self.board)? > 0 {
                 heard = Instant::now();
                 allowed_until_s = self.board.time_s() + TIME_PER_REQUEST_S;
@@ -108,9 +120,6 @@ impl Plugged {
                 return fail(format!("{what}: not done {} s after its last request", HANG_LIMIT.as_secs()));
             }
         }
-        let output = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
-        let output = output.map_err(failed)?;
-        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        Ok(Ran { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) })
+        Ok(())
     }
 }

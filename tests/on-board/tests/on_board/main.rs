@@ -13,9 +13,13 @@ mod failures;
 mod faults;
 mod load;
 mod modes;
+mod monitor;
 mod moved_sheath;
 mod parameters;
 mod ripple_table;
+#[path = "../../../../host-tools/tests/common/screen.rs"]
+#[expect(dead_code, reason = "another part of it is for the tests of the host tools")]
+mod screen;
 mod stop;
 mod terminal;
 mod torque_mode;
