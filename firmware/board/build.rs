@@ -1,4 +1,7 @@
-//! Hands the linker the memory map of the workspace's top folder.
+//! Hands the linker the memory map of the workspace's top folder, and the image its revision.
+
+#[path = "../revision.rs"]
+mod revision;
 
 use std::path::PathBuf;
 use std::{env, fs};
@@ -9,5 +12,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     fs::copy(&map, out.join("memory.x")).map_err(|error| format!("{}: {error}", map.display()))?;
     println!("cargo::rustc-link-search={}", out.display());
     println!("cargo::rerun-if-changed={}", map.display());
+    revision::emit(&[
+        "build.rs",
+        "../revision.rs",
+        "src",
+        "../control/src",
+        "../link/src",
+        "../../model/src",
+    ]);
     Ok(())
 }

@@ -25,6 +25,16 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::recording::Recording;
 use bowden_core::study::LoadedStudy;
+use bowden_host_link::evidence::Origin;
+
+/// This program, as recordings name it.
+fn origin() -> Origin {
+    Origin {
+        tool: concat!("bowden ", env!("CARGO_PKG_VERSION")).to_owned(),
+        tool_revision: env!("BOWDEN_REVISION").to_owned(),
+        ..Origin::default()
+    }
+}
 
 /// Writes a result to standard output. A reader that left early (`bowden check ... | head -1`) is no failure.
 ///

@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use bowden_core::outcome::Failure;
 use bowden_core::progress::Quiet;
+use bowden_host_link::evidence::Origin;
 use bowden_host_link::investigate::limits::Wishes;
 use bowden_host_link::investigate::{Dialog, Setup, investigate};
 use bowden_host_link::sim::SimTransport;
@@ -212,7 +213,8 @@ impl Dialog for Agrees {
 }
 
 fn setup<'s>(rig: &'s Path, out: &'s Path) -> Setup<'s> {
-    Setup { rig, folder: out, wishes: Wishes::default(), ending: "csv", every: 10, dry_run: false }
+    let origin = Origin::default();
+    Setup { rig, folder: out, wishes: Wishes::default(), ending: "csv", every: 10, origin, dry_run: false }
 }
 
 #[test]

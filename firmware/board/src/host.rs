@@ -12,6 +12,7 @@ use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::select::{Either, select};
 use embassy_futures::yield_now;
 use embassy_stm32::flash::{self, Flash};
+use embassy_stm32::uid;
 use embassy_time::{Duration, Instant, Ticker, Timer};
 use embassy_usb::class::cdc_acm::Receiver;
 
@@ -147,7 +148,14 @@ impl Host {
         ended: &Ended,
     ) -> Self {
         let Loaded { parameters, unreadable, table } = loaded;
-        let identity = Identity { firmware: env!("CARGO_PKG_VERSION"), board: BOARD, boot, chip };
+        let identity = Identity {
+            firmware: env!("CARGO_PKG_VERSION"),
+            board: BOARD,
+            revision: env!("BOWDEN_REVISION"),
+            serial: uid::uid_hex(),
+            boot,
+            chip,
+        };
         let mut reach = Reach { ends, state: State::Off, fault: None };
         let broken = if unreadable {
             Some(Fault::ParameterStoreCorrupt)

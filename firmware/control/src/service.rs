@@ -75,6 +75,10 @@ pub struct Identity {
     pub firmware: &'static str,
     /// Name of the board.
     pub board: &'static str,
+    /// Commit that the firmware was built from.
+    pub revision: &'static str,
+    /// Serial number of the processor; empty where there is none.
+    pub serial: &'static str,
     /// What started this run.
     pub boot: Boot,
     /// What it found of its processor.
@@ -250,6 +254,8 @@ impl Service {
             schema: SCHEMA,
             firmware: cut(self.identity.firmware),
             board: cut(self.identity.board),
+            revision: cut(self.identity.revision),
+            serial: cut(self.identity.serial),
             parameters: Parameters::COUNT,
             boot: self.identity.boot,
             chip: self.identity.chip,

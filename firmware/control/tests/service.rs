@@ -55,7 +55,14 @@ impl Port for Tick {
 }
 
 fn service() -> Service {
-    let identity = Identity { firmware: "0.1.0", board: "test", boot: Boot::Power, chip: Chip::EXPECTED };
+    let identity = Identity {
+        firmware: "0.1.0",
+        board: "test",
+        revision: "0123456789ab",
+        serial: "42",
+        boot: Boot::Power,
+        chip: Chip::EXPECTED,
+    };
     Service::new(identity, Parameters::default(), "")
 }
 

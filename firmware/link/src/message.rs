@@ -160,6 +160,10 @@ pub struct Greeting {
     pub firmware: String<24>,
     /// Name of the board.
     pub board: String<24>,
+    /// Commit that the firmware was built from, with `+` behind it if files differed from it.
+    pub revision: String<16>,
+    /// Serial number of the processor, hexadecimal, as USB tells it; empty where there is none.
+    pub serial: String<24>,
     /// Number of parameters.
     pub parameters: u16,
     /// What started the present run.

@@ -37,7 +37,7 @@ pub use columns::{ColumnMap, ColumnSource, TIME_ROLE};
 pub use durable::{DurableFile, DurableWriter, SAVE_INTERVAL, Saved};
 pub use format::Format;
 pub use mcap_file::{SCHEMA, TOPIC};
-pub use metadata::Metadata;
+pub use metadata::{END_GROUP, METADATA_SCHEMA, Metadata, RECORDING_GROUP};
 pub use place::Places;
 pub use recover::{Recovered, recover};
 pub use row::{Cell, RowColumn};

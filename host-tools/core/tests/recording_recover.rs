@@ -143,7 +143,7 @@ fn a_cut_at_any_length_leaves_every_chunk_before_it() {
     // At both ends of every record, within its opcode, its length and its body.
     let cuts = records
         .iter()
-        .flat_map(|(_, start, end)| [*start, start + 1, start + 5, start + 9, (start + end) / 2]);
+        .flat_map(|(_, start, end)| [*start, start + 1, start + 5, start + 9, usize::midpoint(*start, *end)]);
     for cut in cuts.chain([file.len() - 8, file.len() - 1]) {
         fs::write(&cut_path, &file[..cut]).unwrap();
         let before = chunks.iter().filter(|(_, _, end)| *end <= cut).count();
@@ -178,7 +178,7 @@ fn a_flipped_byte_costs_one_chunk_at_most() {
         let (damaged_path, out) = (folder.path().join("damaged.mcap"), folder.path().join("out.mcap"));
         // Opcode, both ends of the length, head and body of records of every kind.
         let places = records.iter().step_by(5).flat_map(|(_, start, end)| {
-            [*start, start + 1, start + 7, start + 12, start + 39, (start + end) / 2, end - 1]
+            [*start, start + 1, start + 7, start + 12, start + 39, usize::midpoint(*start, *end), end - 1]
         });
         for place in places.filter(|place| *place < file.len()).chain([2]) {
             let mut damaged = file.clone();
@@ -212,7 +212,7 @@ fn metadata_and_units_come_along() {
     assert!(records(&file).iter().any(|(opcode, start, _)| *opcode == METADATA && *start < chunk.1));
     let mut damaged = file;
     // The first chunk also tells schema and channel.
-    damaged[(chunk.1 + chunk.2) / 2] ^= 1;
+    damaged[usize::midpoint(chunk.1, chunk.2)] ^= 1;
     let (path, out) = (folder.path().join("damaged.mcap"), folder.path().join("out.mcap"));
     fs::write(&path, damaged).unwrap();
     let recovered = recover(&path, &out).unwrap();
@@ -230,7 +230,7 @@ fn metadata_and_units_come_along() {
 fn a_table_loses_the_lines_that_are_no_rows() {
     let folder = tempfile::tempdir().unwrap();
     let (path, out) = (folder.path().join("a.csv"), folder.path().join("out.csv"));
-    let rows: Vec<String> = (0..100).map(|row| format!("{}.5,{row}.25,\"x,{row}\"\n", row)).collect();
+    let rows: Vec<String> = (0..100).map(|row| format!("{row}.5,{row}.25,\"x,{row}\"\n")).collect();
     let damage = |row: usize, text: &str| {
         let mut rows = rows.clone();
         text.clone_into(&mut rows[row]);

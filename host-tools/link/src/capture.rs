@@ -7,14 +7,16 @@ use std::path::{Path, PathBuf};
 use bowden_core::outcome::Failure;
 use bowden_core::output;
 use bowden_core::progress::Progress;
-use bowden_core::recording::{DurableFile, Format, Metadata};
+use bowden_core::recording::{DurableFile, END_GROUP, Format, Metadata};
 use bowden_link::message::Mode;
 
 use super::conversion::Conversion;
 use super::course::Course;
 use super::error::LinkError;
+use super::evidence::{self, Origin};
 use super::parameters::ParameterSet;
 use super::recorder::{Form, Recorder, Tally};
+use super::rig_file::{self, Weight};
 use super::session::{RunEnd, Session, Stop};
 
 /// Name under which an MCAP file keeps firmware version and parameters.
@@ -36,27 +38,32 @@ pub struct Capture<'c> {
     pub every: u64,
     /// Length of the run, s; `None`: until it ends by itself or by the user.
     pub seconds: Option<f64>,
+    /// What the recording says of itself, beside what the board says.
+    pub origin: &'c Origin,
+    /// Name and load of the joint, where a rig file is made from the board's parameters.
+    pub rig: Option<(&'c str, Option<Weight>)>,
 }
 
 impl Capture<'_> {
-    /// Opens the file, for ticks of a board with these parameters.
+    /// Opens the file, for ticks of this board.
     ///
     /// # Errors
     /// When the medium refuses, or the board lacks a parameter that samples are converted with.
-    pub fn recorder(&self, parameters: &ParameterSet) -> Result<Recorder, Failure> {
-        let mut metadata = Metadata::default();
-        metadata.extend(METADATA, parameters.metadata());
+    pub fn recorder(&self, session: &Session) -> Result<Recorder, Failure> {
+        let parameters = session.parameters();
         let beside = match self.format {
             Format::Mcap => Vec::new(),
             Format::Csv | Format::GzippedCsv => vec![(sidecar(self.out), parameters.to_toml())],
         };
+        let conversion = Conversion::new(parameters)?;
         let form = Form {
             format: self.format,
-            conversion: Conversion::new(parameters)?,
+            conversion,
             mode: self.mode,
             every: self.every,
-            metadata,
+            metadata: self.metadata(session),
             beside,
+            metadata_file: Metadata::file_beside(self.out),
         };
         // Before anything moves, so that a file that cannot be written stops nothing half way.
         let file = DurableFile::open(self.out).map_err(|error| {
@@ -77,7 +84,7 @@ impl Capture<'_> {
         stop: Stop,
         progress: &dyn Progress,
     ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
-        let mut recorder = self.recorder(session.parameters())?;
+        let mut recorder = self.recorder(session)?;
         let mut shown = 0;
         let end = session.run(self.mode, course, stop, &mut |tick| {
             if !recorder.tick(tick) {
@@ -95,7 +102,20 @@ impl Capture<'_> {
                 ControlFlow::Continue(())
             }
         });
-        let tally = recorder.finish(&Metadata::default())?;
+        let how = match &end {
+            Ok(RunEnd::Complete) => "complete".to_owned(),
+            Ok(RunEnd::Interrupted) => "stopped by the user".to_owned(),
+            Ok(RunEnd::Fault(fault)) => fault.to_string(),
+            Ok(RunEnd::Left(state)) => format!("the board went to state {state}"),
+            Err(error) => error.to_string(),
+        };
+        let mut known = evidence::end(recorder.tally(), &how);
+        if let Some((name, load)) = self.rig {
+            let bus_v = recorder.tally().bus_v.unwrap_or_default();
+            let text = rig_file::text(name, session.parameters(), bus_v, load)?;
+            known.extend(END_GROUP, [("rig".to_owned(), text)]);
+        }
+        let tally = recorder.finish(&known)?;
         // Without a row there is nothing to keep, and what ended the run counts.
         match end {
             end if tally.rows > 0 => Ok((tally, end)),
@@ -107,6 +127,13 @@ impl Capture<'_> {
                 Err(Failure::failed(format!("{out}: cannot be written: the run gave no sample")))
             }
         }
+    }
+
+    fn metadata(&self, session: &Session) -> Metadata {
+        let (greeting, port) = session.board();
+        let mut metadata = evidence::of_board(greeting, port, self.origin, self.mode, self.every);
+        metadata.extend(METADATA, session.parameters().metadata());
+        metadata
     }
 }
 

@@ -98,6 +98,8 @@ impl Client {
             schema: SCHEMA,
             firmware: heapless::String::new(),
             board: heapless::String::new(),
+            revision: heapless::String::new(),
+            serial: heapless::String::new(),
             parameters: 0,
             boot: bowden_link::message::Boot::Power,
             chip: bowden_link::message::Chip::EXPECTED,

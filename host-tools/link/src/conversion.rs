@@ -155,6 +155,16 @@ impl Conversion {
     }
 }
 
+/// Name of a mode, as arguments and files have it.
+pub const fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Position => "position",
+        Mode::Torque => "torque",
+        Mode::Hybrid => "hybrid",
+        Mode::Impedance => "impedance",
+    }
+}
+
 /// Columns of a recording of the board: roles, then the raw values that they came from.
 ///
 /// `state` and `limits` are the numbers of [`bowden_link::State`] and [`bowden_link::Limits`]. Without a mode the meaning

@@ -42,6 +42,7 @@ use rounds::{Asked, Case, Diagnosed, track_within};
 
 use crate::Client;
 use crate::course::{Course, Track};
+use crate::evidence::Origin;
 use crate::session::{Session, Stop};
 
 /// Parameters of the board before anything is set, in the folder of an investigation.
@@ -62,6 +63,8 @@ pub struct Setup<'s> {
     pub ending: &'s str,
     /// Every N-th control tick is recorded.
     pub every: u64,
+    /// What recordings say of themselves.
+    pub origin: Origin,
     /// Stop after the plan.
     pub dry_run: bool,
 }
@@ -110,10 +113,12 @@ pub fn investigate(
         return Err(Failure::failed("not confirmed: nothing was moved and nothing was written"));
     }
     output::prepare_folder(setup.folder, &[], &[])?;
+    let rig_text = std::fs::read_to_string(setup.rig).unwrap_or_default();
     let mut account = Investigation::new(&rig.name, session.parameters(), plan);
     let driver = Driver {
         session,
         folder: setup.folder,
+        origin: Origin { rig: Some(rig_text), ..setup.origin.clone() },
         ending: setup.ending,
         every: setup.every,
         stop,

@@ -14,6 +14,7 @@
 //! | [`course`] | what the joint is to follow |
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
+//! | [`evidence`] | what a recording says of itself |
 
 #![forbid(unsafe_code)]
 
@@ -22,6 +23,7 @@ pub mod client;
 pub mod conversion;
 pub mod course;
 pub mod error;
+pub mod evidence;
 pub mod from_rig;
 pub mod hub;
 pub mod investigate;

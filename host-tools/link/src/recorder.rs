@@ -13,6 +13,7 @@ use bowden_core::recording::{DurableFile, DurableWriter, Format, Metadata, Saved
 use bowden_link::message::Mode;
 
 use super::conversion::{Conversion, columns};
+use super::evidence;
 use super::losses::Losses;
 use super::session::RunTick;
 
@@ -23,9 +24,10 @@ const QUEUE: usize = 1 << 16;
 pub struct Recorder {
     path: PathBuf,
     rows: SyncSender<RunTick>,
-    writer: JoinHandle<Result<Option<DurableWriter>, Broken>>,
+    writer: JoinHandle<Written>,
     conversion: Conversion,
     every: u64,
+    metadata_file: Option<PathBuf>,
     tally: Tally,
 }
 
@@ -40,11 +42,16 @@ pub struct Form {
     pub mode: Mode,
     /// Only every N-th tick is written, beginning with the first.
     pub every: u64,
-    /// What stands before the rows.
+    /// What stands before the rows; the time of the first one is added.
     pub metadata: Metadata,
     /// Files that stand beside the recording, with their text.
     pub beside: Vec<(PathBuf, String)>,
+    /// File that the metadata go to where the format has no place for them.
+    pub metadata_file: Option<PathBuf>,
 }
+
+/// The writer and what stands before its rows; nothing without a row.
+type Written = Result<Option<(DurableWriter, Metadata)>, Broken>;
 
 /// The medium refused.
 #[derive(Debug)]
@@ -83,8 +90,10 @@ impl Recorder {
     pub fn new(file: DurableFile, form: Form, path: &Path) -> Self {
         let (rows, received) = sync_channel(QUEUE);
         let (conversion, every) = (form.conversion, form.every.max(1));
+        let metadata_file = form.metadata_file.clone();
         let writer = thread::spawn(move || write(file, &form, &received));
-        Self { path: path.to_owned(), rows, writer, conversion, every, tally: Tally::default() }
+        let path = path.to_owned();
+        Self { path, rows, writer, conversion, every, metadata_file, tally: Tally::default() }
     }
 
     /// Takes a tick; `false` once the medium has refused, which [`Recorder::finish`] tells.
@@ -124,11 +133,16 @@ impl Recorder {
     /// # Errors
     /// Exit status 1 with what is kept, if the medium refused.
     pub fn finish(self, metadata: &Metadata) -> Result<Tally, Failure> {
-        let Self { path, rows, writer, tally, .. } = self;
+        let Self { path, rows, writer, metadata_file, tally, .. } = self;
         drop(rows);
         let written = match writer.join() {
-            Ok(Ok(Some(mut rows))) => {
-                rows.finish(metadata).map(|()| tally).map_err(|error| Broken { error, saved: rows.saved() })
+            Ok(Ok(Some((mut rows, mut all)))) => {
+                let beside = metadata_file.map_or(Ok(()), |path| {
+                    metadata.groups().for_each(|(group, entries)| all.extend(group, entries.clone()));
+                    output::write_text(&path, &all.to_toml())
+                });
+                let ended = rows.finish(metadata).and(beside);
+                ended.map(|()| tally).map_err(|error| Broken { error, saved: rows.saved() })
             }
             Ok(written) => written.map(|_| tally),
             Err(_) => Err(Broken { error: io::Error::other("its thread ended"), saved: Saved::default() }),
@@ -147,11 +161,7 @@ impl Recorder {
 }
 
 /// Writes what comes, and puts it on the medium when it is due.
-fn write(
-    file: DurableFile,
-    form: &Form,
-    received: &Receiver<RunTick>,
-) -> Result<Option<DurableWriter>, Broken> {
+fn write(file: DurableFile, form: &Form, received: &Receiver<RunTick>) -> Written {
     let Ok(first) = received.recv() else {
         file.abandon();
         return Ok(None);
@@ -160,7 +170,12 @@ fn write(
     for (path, text) in &form.beside {
         output::write_text(path, text).map_err(nothing)?;
     }
-    let mut rows = file.begin(form.format, &columns(Some(form.mode)), &form.metadata).map_err(nothing)?;
+    let mut metadata = form.metadata.clone();
+    evidence::begin(&mut metadata, first.tick, first.period_ns);
+    if let Some(path) = &form.metadata_file {
+        output::write_text(path, &metadata.to_toml()).map_err(nothing)?;
+    }
+    let mut rows = file.begin(form.format, &columns(Some(form.mode)), &metadata).map_err(nothing)?;
     let mut next = Some(first);
     loop {
         let written = match next {
@@ -177,7 +192,7 @@ fn write(
         next = match received {
             Ok(tick) => Some(tick),
             Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => return Ok(Some(rows)),
+            Err(RecvTimeoutError::Disconnected) => return Ok(Some((rows, metadata))),
         };
     }
 }

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use bowden_core::outcome::Failure;
-use bowden_link::message::{Goal, Mode, Reference, Refusal, STREAM_LENGTH, Status};
+use bowden_link::message::{Goal, Greeting, Mode, Reference, Refusal, STREAM_LENGTH, Status};
 use bowden_link::{FaultRecord, Sample, State};
 
 use super::client::Client;
@@ -96,6 +96,11 @@ impl Session {
     /// The board.
     pub fn client(&mut self) -> &mut Client {
         &mut self.client
+    }
+
+    /// What it says of itself, and its port.
+    pub fn board(&self) -> (&Greeting, &str) {
+        (self.client.greeting(), self.client.port())
     }
 
     /// Its parameters.

@@ -76,6 +76,20 @@ impl CourseArguments {
         (!is_name).then_some(self.reference.as_path())
     }
 
+    /// The reference in words.
+    pub fn words(&self) -> String {
+        let Self { reference, amplitude, offset, frequency, .. } = self;
+        let unit = if self.mode().follows_torque() { "N m" } else { "rad" };
+        let name = reference.display();
+        match NAMES.iter().find(|(name, _)| reference.as_os_str() == *name) {
+            Some((_, Some(_))) => {
+                format!("{name} of {amplitude} {unit} at {frequency} Hz around {offset} {unit}")
+            }
+            Some((_, None)) => format!("hold at {offset} {unit}"),
+            None => format!("file {name}"),
+        }
+    }
+
     /// Reads what there is to read.
     ///
     /// # Errors

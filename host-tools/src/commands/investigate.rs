@@ -128,6 +128,7 @@ impl InvestigateArguments {
             wishes: self.limits.into(),
             ending: &self.format,
             every: self.every,
+            origin: super::origin(),
             dry_run: self.dry_run,
         };
         investigate(&setup, client, dialog, &interrupt::requested, &UntilInterrupted(progress))

@@ -106,8 +106,10 @@ impl MonitorArguments {
         session: &Session,
     ) -> Result<Option<(Recorder, String)>, Failure> {
         let (Some(out), Some(format)) = (self.record.as_deref(), format) else { return Ok(None) };
-        let capture = Capture { out, format, mode: plan.mode, every: 1, seconds: None };
-        Ok(Some((capture.recorder(session.parameters())?, out.display().to_string())))
+        let origin = super::origin();
+        let capture =
+            Capture { out, format, mode: plan.mode, every: 1, seconds: None, origin: &origin, rig: None };
+        Ok(Some((capture.recorder(session)?, out.display().to_string())))
     }
 
     /// What it amounts to.

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
-use bowden_core::recording::Format;
+use bowden_core::recording::{Format, Metadata};
 use bowden_host_link::capture::{Capture, PROGRESS_STEPS, sidecar};
 use bowden_host_link::course::Course;
+use bowden_host_link::evidence::Origin;
 use bowden_host_link::recorder::Tally;
 use bowden_host_link::rig_file::{self, Weight};
 use bowden_host_link::session::{RunEnd, Session};
@@ -22,8 +23,8 @@ use crate::interrupt;
 #[command(
     after_help = "The board checks itself and the pretension first; the bridge is off again at the end, also after an \
                   error or Ctrl-C. t_s is the board's time since it was switched on; samples that were lost leave gaps \
-                  in it, and the exit status is 3. Beside a CSV stands NAME.parameters.toml with firmware version and \
-                  parameters; an MCAP file holds them itself."
+                  in it, and the exit status is 3. Beside a CSV stand NAME.parameters.toml with firmware version and \
+                  parameters, and NAME.recording.toml with both and time, tool, board and note; an MCAP file holds them itself."
 )]
 pub struct RecordArguments {
     #[command(flatten)]
@@ -45,6 +46,9 @@ pub struct RecordArguments {
     /// Record every N-th control tick
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     every: u64,
+    /// What is to be remembered of this run; it stands in the recording
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
     /// Write a rig file from the board's parameters, for `bowden diagnose` and the like
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
@@ -63,12 +67,13 @@ impl RecordArguments {
         let format = Format::for_output(&self.out)?;
         let inputs: Vec<&Path> = self.course.file().into_iter().chain(self.parameters.as_deref()).collect();
         output::check_file(&self.out, &inputs)?;
-        let sidecar = (format != Format::Mcap).then(|| sidecar(&self.out));
-        for path in sidecar.iter().chain(&self.rig) {
+        let mut others = vec![self.out.clone()];
+        others.extend((format != Format::Mcap).then(|| sidecar(&self.out)));
+        others.extend(Metadata::file_beside(&self.out));
+        for path in others.iter().skip(1).chain(&self.rig) {
             output::check_file(path, &inputs)?;
         }
-        if let Some(rig) = self.rig.as_ref().filter(|rig| **rig == self.out || Some(*rig) == sidecar.as_ref())
-        {
+        if let Some(rig) = self.rig.as_ref().filter(|rig| others.contains(rig)) {
             let rig = rig.display();
             return Err(Failure::bad_input(format!(
                 "--rig {rig}: another output has this name; choose another"
@@ -97,13 +102,22 @@ impl RecordArguments {
             session.home(stop)?;
         }
         progress.stage("recording", if seconds.is_some() { PROGRESS_STEPS } else { 0 });
-        let capture =
-            Capture { out: &self.out, format, mode: self.course.mode(), every: self.every, seconds };
+        let name = self.out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
+        let origin =
+            Origin { note: self.note.clone(), reference: Some(self.course.words()), ..super::origin() };
+        let capture = Capture {
+            out: &self.out,
+            format,
+            mode: self.course.mode(),
+            every: self.every,
+            seconds,
+            origin: &origin,
+            rig: self.rig.is_some().then_some((&name, self.load)),
+        };
         let (tally, end) = capture.run(&mut session, &course, stop, progress)?;
 
         let parameters = session.parameters();
         if let Some(path) = &self.rig {
-            let name = self.out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
             let text = rig_file::text(&name, parameters, tally.bus_v.unwrap_or_default(), self.load)?;
             rig_file::save(path, &text)?;
         }

@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use bowden_core::outcome::Failure;
 use bowden_core::output;
-use bowden_core::recording::{Format, Metadata};
+use bowden_core::recording::Format;
 use bowden_host_link::capture::sidecar;
+use bowden_host_link::evidence;
 use bowden_host_link::hub::{Next, Reader};
 use bowden_host_link::recorder::{Recorder, Tally};
 use bowden_host_link::session::RunTick;
@@ -67,7 +68,8 @@ pub fn write(
             Next::Ended => break,
         }
     }
-    let tally = recorder.finish(&Metadata::default());
+    let known = evidence::end(recorder.tally(), "the monitor was closed");
+    let tally = recorder.finish(&known);
     if tally.is_err() {
         progress.say(format!("{shown}: NOT RECORDED ANY MORE"));
     }

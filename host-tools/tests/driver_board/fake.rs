@@ -333,6 +333,8 @@ impl Fake {
                     schema: self.mishaps.schema.unwrap_or(SCHEMA),
                     firmware: "9.8.7".try_into().unwrap(),
                     board: "fake".try_into().unwrap(),
+                    revision: "0123456789ab".try_into().unwrap(),
+                    serial: "0042002A".try_into().unwrap(),
                     parameters: PARAMETERS.len() as u16,
                     boot: Boot::Watchdog,
                     chip: Chip { clock: ClockSource::Internal, ..Chip::EXPECTED },

@@ -7,6 +7,7 @@ mod client;
 #[path = "../common/mod.rs"]
 mod common;
 mod cuts;
+mod evidence;
 mod fake;
 mod from_rig;
 mod mishaps;

@@ -1,7 +1,7 @@
 //! Recordings from and to files.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 
 use super::{
@@ -45,8 +45,9 @@ impl Recording {
             )));
         }
         if start.starts_with(mcap::MAGIC) {
-            mcap_file::read(file, source, options)
-        } else if named_mcap {
+            return mcap_file::read(file, source, options);
+        }
+        let recording = if named_mcap {
             Err(Failure::bad_input(format!(
                 "{source}: byte 0: not the start of an MCAP file; if it is a table, call it .csv"
             )))
@@ -54,7 +55,13 @@ impl Recording {
             comma_separated::read(flate2::bufread::MultiGzDecoder::new(file), source, options)
         } else {
             comma_separated::read(file, source, options)
+        };
+        let mut recording = recording?;
+        match Metadata::beside(path) {
+            Ok(metadata) => recording.metadata = metadata,
+            Err(note) => recording.notes.push(note),
         }
+        Ok(recording)
     }
 
     /// Writes the recording in the format that the file name asks for: `.csv`, `.csv.gz` or `.mcap`.
@@ -70,7 +77,13 @@ impl Recording {
                 writer.row(*t_s, self.columns.iter().map(|column| column.cell(sample)))?;
             }
             writer.finish(&Metadata::default())
-        })
+        })?;
+        match Metadata::file_beside(path).filter(|_| !self.metadata.is_empty()) {
+            Some(beside) => {
+                output::write_file(&beside, |file| file.write_all(self.metadata.to_toml().as_bytes()))
+            }
+            None => Ok(()),
+        }
     }
 
     /// A column as it is written, with its unit where that is known.

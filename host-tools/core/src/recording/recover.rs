@@ -12,11 +12,11 @@ mod scan;
 mod sink;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek};
+use std::io::{BufRead, BufReader, Seek, Write};
 use std::path::Path;
 
 use self::sink::Sink;
-use super::{Format, READ_BUFFER};
+use super::{Format, Metadata, READ_BUFFER};
 use crate::outcome::Failure;
 use crate::output;
 
@@ -29,6 +29,8 @@ pub struct Recovered {
     pub span_s: Option<(f64, f64)>,
     /// What is missing, one line each.
     pub missing: Vec<String>,
+    /// What the file says beside the rows.
+    pub metadata: Metadata,
 }
 
 /// Lines about single places; those beyond are counted.
@@ -58,6 +60,8 @@ pub fn recover(path: &Path, out: &Path) -> Result<Recovered, Failure> {
     let mut recovered = Err(Failure::failed(""));
     output::write_file(out, |file_out| {
         let mut sink = Sink::new(format, file_out);
+        // A file that cannot be used is said to be missing by whoever reads it.
+        sink.metadata = Metadata::beside(path).unwrap_or_default();
         let taken = if is_mcap {
             file.rewind()?;
             scan::take(&mut file, &source, &mut sink)
@@ -88,7 +92,11 @@ pub fn recover(path: &Path, out: &Path) -> Result<Recovered, Failure> {
         Err(of_input) if !of_input.message().is_empty() => of_input.clone(),
         _ => failure,
     })?;
-    recovered
+    let recovered = recovered?;
+    if let Some(beside) = Metadata::file_beside(out).filter(|_| !recovered.metadata.is_empty()) {
+        output::write_file(&beside, |file| file.write_all(recovered.metadata.to_toml().as_bytes()))?;
+    }
+    Ok(recovered)
 }
 
 /// At most [`PLACES_SHOWN`] of the lines, and how many more there are.

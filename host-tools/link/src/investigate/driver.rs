@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::capture::{Capture, PROGRESS_STEPS};
 use crate::course::Course;
+use crate::evidence::Origin;
 use crate::session::{RunEnd, Session, Stop};
 
 /// A recording that an investigation made.
@@ -49,6 +50,8 @@ pub struct Driver<'d> {
     pub session: Session,
     /// Where recordings go.
     pub folder: &'d Path,
+    /// What recordings say of themselves.
+    pub origin: Origin,
     /// Ending of recordings: `csv`, `csv.gz`, `mcap`.
     pub ending: &'d str,
     /// Every N-th tick is written.
@@ -76,8 +79,16 @@ impl Driver<'_> {
         self.session.home(self.stop)?;
         self.progress.stage(name, PROGRESS_STEPS);
         let format = Format::for_output(&out)?;
-        let capture =
-            Capture { out: &out, format, mode: Mode::Position, every: self.every, seconds: Some(*seconds) };
+        let origin = Origin { reference: Some((*reference).to_owned()), ..self.origin.clone() };
+        let capture = Capture {
+            out: &out,
+            format,
+            mode: Mode::Position,
+            every: self.every,
+            seconds: Some(*seconds),
+            origin: &origin,
+            rig: None,
+        };
         let (tally, end) = capture.run(&mut self.session, course, self.stop, self.progress)?;
         self.recorded.push(Recorded {
             file: out.file_name().unwrap_or_default().to_string_lossy().into_owned(),

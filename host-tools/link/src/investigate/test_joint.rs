@@ -13,6 +13,7 @@ use super::plan::Plan;
 use super::report::Investigation;
 use super::{Diagnose, Dialog, Setup, Work};
 use crate::Client;
+use crate::evidence::Origin;
 use crate::session::Session;
 use crate::sim::SimTransport;
 
@@ -52,10 +53,19 @@ pub(super) fn with_work<T>(
     let plan = Plan::new(&parameters.control(), &wishes).unwrap();
     let mut account = Investigation::new("bench", &parameters, plan);
     let (rig_file, folder) = (Path::new("rig.toml"), folder.path());
-    let setup = Setup { rig: rig_file, folder, wishes, ending: "csv", every: 10, dry_run: false };
+    let setup = Setup {
+        rig: rig_file,
+        folder,
+        wishes,
+        ending: "csv",
+        every: 10,
+        origin: Origin::default(),
+        dry_run: false,
+    };
     let driver = Driver {
         session,
         folder,
+        origin: Origin::default(),
         ending: "csv",
         every: 10,
         stop: &|| false,

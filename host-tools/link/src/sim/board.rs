@@ -104,6 +104,8 @@ impl SimBoard {
         let identity = Identity {
             firmware: env!("CARGO_PKG_VERSION"),
             board: "simulated",
+            revision: "",
+            serial: "",
             boot: Boot::Power,
             chip: Chip::EXPECTED,
         };

@@ -34,8 +34,10 @@ pub struct Sink<W: Write + Seek> {
     time: usize,
     /// Units by the file's own schema.
     pub units: BTreeMap<String, String>,
-    /// What the file says beside the rows, and was not written yet.
+    /// What the file says beside the rows.
     pub metadata: Metadata,
+    /// The same, as far as it was written before the rows.
+    before: Metadata,
     rows: u64,
     span_s: Option<(f64, f64)>,
 }
@@ -51,6 +53,7 @@ impl<W: Write + Seek> Sink<W> {
             time: 0,
             units: BTreeMap::new(),
             metadata: Metadata::default(),
+            before: Metadata::default(),
             rows: 0,
             span_s: None,
         }
@@ -86,8 +89,8 @@ impl<W: Write + Seek> Sink<W> {
             .collect();
         self.names = names;
         if let Some(out) = self.out.take() {
-            let metadata = std::mem::take(&mut self.metadata);
-            self.writer = Some(RowWriter::new(self.format, &columns, &metadata, out)?);
+            self.writer = Some(RowWriter::new(self.format, &columns, &self.metadata, out)?);
+            self.before = self.metadata.clone();
         }
         Ok(())
     }
@@ -119,8 +122,14 @@ impl<W: Write + Seek> Sink<W> {
     /// Ends the output.
     pub fn finish(mut self, missing: Vec<String>) -> Result<Recovered, Stopped> {
         if let Some(writer) = self.writer.take() {
-            writer.finish(&self.metadata)?;
+            let mut rest = Metadata::default();
+            for (group, entries) in
+                self.metadata.groups().filter(|(group, all)| self.before.group(group) != Some(all))
+            {
+                rest.extend(group, entries.clone());
+            }
+            writer.finish(&rest)?;
         }
-        Ok(Recovered { rows: self.rows, span_s: self.span_s, missing })
+        Ok(Recovered { rows: self.rows, span_s: self.span_s, missing, metadata: self.metadata })
     }
 }
