@@ -8,16 +8,15 @@ use bowden_control::service::{Identity, ParameterStore, Port, Reply, Service, St
 use bowden_control::tick::Command;
 use bowden_link::message::{Boot, Chip, Provocation};
 use bowden_link::{Accumulator, Fault, FaultRecord, FromBoard, Request, Sample, State};
-use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_futures::select::{Either, select};
 use embassy_futures::yield_now;
-use embassy_stm32::flash::{self, Flash};
 use embassy_stm32::uid;
 use embassy_time::{Duration, Instant, Ticker, Timer};
 use embassy_usb::class::cdc_acm::Receiver;
 
 use crate::queues::HostEnds;
 use crate::retained::{self, Ended};
+use crate::store_flash::StoreFlash;
 use crate::telemetry::ANSWERS;
 use crate::usb::{PACKET, UsbDriver};
 use crate::{BOARD, TABLE_STORE, bridge, encoders, tick};
@@ -30,9 +29,6 @@ const REQUEST: usize = 192;
 
 /// Time that an answer gets before a failure that was asked for.
 const LAST_WORDS: Duration = Duration::from_millis(5);
-
-/// The board's flash.
-pub type BoardFlash = BlockingAsync<Flash<'static, flash::Blocking>>;
 
 /// Rounds of [`run`], for the watchdog.
 static ROUNDS: AtomicU32 = AtomicU32::new(0);
@@ -52,8 +48,15 @@ pub struct Loaded {
     table: Result<Option<RippleTable>, StoreError>,
 }
 
+impl Loaded {
+    /// Defaults, where the stores are not read.
+    pub fn nothing() -> Self {
+        Self { parameters: Parameters::default(), unreadable: false, table: Ok(None) }
+    }
+}
+
 /// Reads both stores.
-pub async fn load(store: &mut ParameterStore<BoardFlash>) -> Loaded {
+pub async fn load(store: &mut ParameterStore<StoreFlash>) -> Loaded {
     let (parameters, unreadable) = match store.load().await {
         Ok(parameters) => (parameters.unwrap_or_default(), false),
         Err(_) => (Parameters::default(), true),
@@ -68,7 +71,7 @@ pub async fn load(store: &mut ParameterStore<BoardFlash>) -> Loaded {
 /// What answers the host.
 pub struct Host {
     service: Service,
-    store: ParameterStore<BoardFlash>,
+    store: ParameterStore<StoreFlash>,
     /// The store holds something that is no set of parameters.
     unreadable: bool,
     reach: Reach,
@@ -80,6 +83,8 @@ struct Reach {
     ends: HostEnds,
     state: State,
     fault: Option<FaultRecord>,
+    /// No tick runs: this is the fault, for good.
+    locked: Option<FaultRecord>,
 }
 
 impl Port for Reach {
@@ -123,6 +128,10 @@ impl Reach {
     /// without its record.
     fn listen(&mut self) {
         self.state = tick::state();
+        if self.locked.is_some() {
+            self.fault = self.locked;
+            return;
+        }
         while let Some(record) = self.ends.faults.dequeue() {
             defmt::error!(
                 "fault {=u8} channel {=u8} at tick {=u32}: {=f32}, limit {=f32}",
@@ -142,7 +151,7 @@ impl Host {
     /// has cleared it.
     pub fn new(
         loaded: Loaded,
-        store: ParameterStore<BoardFlash>,
+        store: ParameterStore<StoreFlash>,
         ends: HostEnds,
         (boot, chip): (Boot, Chip),
         ended: &Ended,
@@ -156,15 +165,26 @@ impl Host {
             boot,
             chip,
         };
-        let mut reach = Reach { ends, state: State::Off, fault: None };
-        let broken = if unreadable {
+        let locked = chip.is_safe().then(|| FaultRecord {
+            fault: Fault::RestartLoop,
+            channel: 0,
+            tick: 0,
+            got: f32::from(chip.restarts),
+            limit: f32::from(Chip::SAFE_RESTARTS),
+        });
+        let mut reach = Reach { ends, state: State::Off, fault: None, locked };
+        let one_bank = chip.flash_banks != Chip::EXPECTED.flash_banks;
+        let broken = if one_bank {
+            Some(Fault::FlashBanks)
+        } else if unreadable {
             Some(Fault::ParameterStoreCorrupt)
         } else {
             table.is_err().then_some(Fault::RippleTableCorrupt)
         };
         if let Some(fault) = ended.fault.or(broken) {
             // The queue is empty.
-            let _ = reach.command(Command::Trip(fault, 0, 1.0, 0.0));
+            let (got, limit) = if fault == Fault::FlashBanks { (1.0, 2.0) } else { (1.0, 0.0) };
+            let _ = reach.command(Command::Trip(fault, 0, got, limit));
         }
         if let Ok(Some(table)) = &table {
             // There is room for four commands.
@@ -207,6 +227,7 @@ impl Host {
     }
 
     async fn answer(&mut self, request: &Request) {
+        retained::host_is_there();
         self.reach.listen();
         let answer = match self.service.handle(request, now_ms(), &mut self.reach) {
             Reply::Say(answer) => answer,

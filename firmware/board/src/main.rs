@@ -27,21 +27,24 @@ mod mask;
 mod queues;
 mod retained;
 mod stop;
+mod store_flash;
 mod telemetry;
 mod tick;
 mod usb;
 mod watch;
 
 use bowden_control::service::ParameterStore;
+use bowden_link::message::Chip;
 use defmt_rtt as _;
-use embassy_embedded_hal::adapter::BlockingAsync;
 use embassy_executor::Spawner;
-use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::wdg::IndependentWatchdog;
+
+use crate::host::Loaded;
+use crate::store_flash::StoreFlash;
 
 /// Name of the board in the greeting.
 const BOARD: &str = "nucleo-g474re";
@@ -63,8 +66,9 @@ async fn main(spawner: Spawner) {
     // The HAL leaves its time driver at priority 0, which critical sections do not mask.
     interrupt::TIM5.set_priority(Priority::P3);
     let boot = retained::boot_cause();
+    let restarts = retained::count_restart(boot);
     let (p, clock_source) = clock::init();
-    let chip = chip::state(clock_source);
+    let chip = chip::state(clock_source, restarts);
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
     let ended = retained::take(boot);
@@ -76,23 +80,34 @@ async fn main(spawner: Spawner) {
         chip
     );
 
-    let flash = BlockingAsync::new(Flash::new_blocking(p.FLASH));
+    let usable = chip.flash_banks == Chip::EXPECTED.flash_banks && !chip.is_safe();
+    let flash = StoreFlash::new(p.FLASH, usable);
     let mut store = ParameterStore::new(flash, STORE).expect("the store fits the flash");
-    let loaded = host::load(&mut store).await;
+    let loaded = if usable { host::load(&mut store).await } else { Loaded::nothing() };
     watchdog.pet();
     let parameters = loaded.parameters.clone();
-
-    let rate = parameters.rate_divider();
-    let bridge = bridge::Bridge::new(p.TIM1, (p.PA8, p.PB13), (p.PA9, p.PB14), p.PB12, p.PC6, rate);
-    let analog = analog::Analog::new(p.ADC1, p.ADC2, (p.PC0, p.PC1, p.PC2, p.PC3), (p.PA0, p.PA1));
-    let [at_input, at_joint] = &encoder_bus::BUSES;
-    at_input.adopt(Spi::new_blocking(p.SPI1, p.PB3, p.PB5, p.PB4, spi::Config::default()), p.PA15);
-    at_joint.adopt(Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, spi::Config::default()), p.PD2);
-    encoders::start(parameters.encoder_parts());
     let queues = queues::split();
     // Puts the order to stop after a bad end into the queue before the first tick.
     let host = host::Host::new(loaded, store, queues.host, (boot, chip), &ended);
-    tick::start(&parameters, bridge, analog, Output::new(p.PC8, Level::Low, Speed::VeryHigh), queues.tick);
+    if chip.is_safe() {
+        // What ended the runs before may be anything of this: it is left alone, and the host can ask.
+        tick::stay_off();
+    } else {
+        let rate = parameters.rate_divider();
+        let bridge = bridge::Bridge::new(p.TIM1, (p.PA8, p.PB13), (p.PA9, p.PB14), p.PB12, p.PC6, rate);
+        let analog = analog::Analog::new(p.ADC1, p.ADC2, (p.PC0, p.PC1, p.PC2, p.PC3), (p.PA0, p.PA1));
+        let [at_input, at_joint] = &encoder_bus::BUSES;
+        at_input.adopt(Spi::new_blocking(p.SPI1, p.PB3, p.PB5, p.PB4, spi::Config::default()), p.PA15);
+        at_joint.adopt(Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, spi::Config::default()), p.PD2);
+        encoders::start(parameters.encoder_parts());
+        tick::start(
+            &parameters,
+            bridge,
+            analog,
+            Output::new(p.PC8, Level::Low, Speed::VeryHigh),
+            queues.tick,
+        );
+    }
 
     let (port, device) = usb::new(p.USB, p.PA12, p.PA11);
     let (sender, receiver) = port.split();
@@ -100,5 +115,5 @@ async fn main(spawner: Spawner) {
     spawner.spawn(usb::run(device).expect(ONCE));
     spawner.spawn(telemetry::run(sender, queues.samples).expect(ONCE));
     spawner.spawn(host::run(host, receiver).expect(ONCE));
-    spawner.spawn(watch::run(watchdog, light).expect(ONCE));
+    spawner.spawn(watch::run(watchdog, light, chip.is_safe()).expect(ONCE));
 }

@@ -26,9 +26,14 @@ pub struct Retained {
     /// Length of the text.
     length: AtomicU8,
     text: [AtomicU8; PANIC_TEXT],
+    /// Restarts since a host was there, under [`COUNTED`].
+    restarts: AtomicU32,
     /// The last ticks.
     pub snapshot: Snapshot,
 }
+
+/// Upper three bytes of [`Retained::restarts`], if it is one.
+const COUNTED: u32 = 0xb0bd_5a00;
 
 struct Place(UnsafeCell<MaybeUninit<Retained>>);
 
@@ -70,6 +75,24 @@ pub fn boot_cause() -> Boot {
     };
     pac::RCC.csr().modify(|flags| flags.set_rmvf(true));
     boot
+}
+
+/// Counts this start: how many in a row ended by the firmware or the watchdog before a host was there.
+pub fn count_restart(boot: Boot) -> u8 {
+    let kept = &memory().restarts;
+    let before = kept.load(Ordering::Relaxed);
+    let before = if before & !0xff == COUNTED { before as u8 } else { 0 };
+    let restarts = match boot {
+        Boot::Software | Boot::Watchdog => before.saturating_add(1),
+        Boot::Power | Boot::Pin => 0,
+    };
+    kept.store(COUNTED | u32::from(restarts), Ordering::Relaxed);
+    restarts
+}
+
+/// A host is there, so that restarts are no secret.
+pub fn host_is_there() {
+    memory().restarts.store(COUNTED, Ordering::Relaxed);
 }
 
 /// Takes what was kept and makes room for the next. The snapshot stays, frozen, if a fault ended the run before.

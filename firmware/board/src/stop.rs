@@ -7,7 +7,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
 
-use crate::{bridge, retained};
+use crate::{bridge, retained, store_flash};
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
@@ -36,10 +36,21 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     SCB::sys_reset()
 }
 
-/// The clock's security system (RM0440, 7.2.8): the crystal stopped, hardware has opened the bridge and goes on with 16 MHz.
+/// Damaged flash (RM0440, 5.3.4), or the clock's security system (7.2.8): the crystal stopped, and the core goes on with 16 MHz.
+/// Hardware has opened the bridge.
 #[exception]
 #[allow(unsafe_code, reason = "the macro asks for an unsafe function")]
 unsafe fn NonMaskableInt() {
+    if store_flash::take_damage() {
+        return;
+    }
+    let check = pac::FLASH.eccr().read();
+    if check.eccd() {
+        bridge::off();
+        let bank = if check.bk_ecc() { 2 } else { 1 };
+        retained::keep(Fault::FlashDamaged, format_args!("bank {bank}, {:#x}", check.addr_ecc()));
+        SCB::sys_reset();
+    }
     if pac::RCC.cifr().read().cssf() {
         bridge::off();
         retained::keep(Fault::ClockFailed, format_args!(""));

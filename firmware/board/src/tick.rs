@@ -173,6 +173,11 @@ pub fn start(
     defmt::info!("control tick every {=u32} ns, core at {=u32} Hz", parameters.period_ns(), CORE_HZ);
 }
 
+/// No tick runs, and none will: the state is that of a fault from the start.
+pub fn stay_off() {
+    TOLD.state.store(State::Fault as u8, Ordering::Relaxed);
+}
+
 /// Lets the tick hand its samples to telemetry.
 pub fn set_telemetry(wanted: bool) {
     TELEMETRY.store(wanted, Ordering::Relaxed);

@@ -188,6 +188,9 @@ impl Service {
     /// Carries a request out as far as it needs no flash. `now_ms` wraps.
     pub fn handle(&mut self, request: &Request, now_ms: u32, port: &mut impl Port) -> Reply {
         self.heard_ms = now_ms;
+        if self.identity.chip.is_safe() && !answered_in_safe_mode(&request.message) {
+            return Reply::Say(FromBoard::Refused(Refusal::SafeMode));
+        }
         let answer = match &request.message {
             ToBoard::StoreParameters => {
                 // Erasing masks all interrupts below the tick's, so encoders are not read meanwhile.
@@ -384,6 +387,22 @@ impl Service {
             snapshot,
         }
     }
+}
+
+/// Whether a board in safe mode answers: what reads is answered, what would reach tick or flash is not.
+const fn answered_in_safe_mode(message: &ToBoard) -> bool {
+    matches!(
+        message,
+        ToBoard::Hello
+            | ToBoard::Alive
+            | ToBoard::ReadParameter(_)
+            | ToBoard::Telemetry(_)
+            | ToBoard::ReadStatus
+            | ToBoard::ReadSnapshot(_)
+            | ToBoard::ReadPanicText
+            | ToBoard::ReadTable
+            | ToBoard::ReadTablePoints(_)
+    )
 }
 
 /// Refuses what may not change while the bridge drives.

@@ -132,9 +132,12 @@ faults! {
     35 HardFault "" "the processor met an instruction or address that it cannot use" "report this with the fault record";
     36 RippleTableCorrupt "" "the stored ripple table cannot be read" "write the table anew or clear it, then store: bowden params table";
     37 ClockFailed "" "the crystal of the processor stopped" "check the crystal; until it runs again, times are good to 1 % only";
+    38 FlashDamaged "" "a word of the flash is damaged" "flash the image again; if it comes back, replace the board";
     40 SelfTestTimeout "s" "the self test did not end in time" "see which sensor is not steady at rest";
     41 PretensionOff "N" "tension at rest is not the pretension" "set the pretension, or correct the parameter tendon.pretension";
     42 HomingTimeout "s" "the joint did not reach angle zero in time" "look for a blocked joint or a wrong encoder direction";
+    50 FlashBanks "banks" "the flash is set up as one bank, so that nothing can be stored" "set the option bit DBANK and flash the image again";
+    51 RestartLoop "resets" "the board restarted again and again before a host was there" "read the panic text, then reset the board; report this if it comes back";
 }
 
 /// A fault with its numbers.

@@ -182,11 +182,23 @@ pub struct Chip {
     pub flash_banks: u8,
     /// Level of the brown-out reset in the option bytes, 0 (1.7 V) to 4 (2.8 V).
     pub brown_out_level: u8,
+    /// Resets by panics, faults of the processor and the watchdog since a host was there.
+    pub restarts: u8,
 }
 
 impl Chip {
     /// What an image expects, and what a simulated board has.
-    pub const EXPECTED: Self = Self { clock: ClockSource::Crystal, flash_banks: 2, brown_out_level: 4 };
+    pub const EXPECTED: Self =
+        Self { clock: ClockSource::Crystal, flash_banks: 2, brown_out_level: 4, restarts: 0 };
+
+    /// Restarts from which on the board stays in safe mode: bridge locked, stores unread, USB only.
+    pub const SAFE_RESTARTS: u8 = 3;
+
+    /// Whether the board is in safe mode. The next reset ends it, once a host has been there.
+    #[must_use]
+    pub const fn is_safe(&self) -> bool {
+        self.restarts >= Self::SAFE_RESTARTS
+    }
 }
 
 /// Oscillator that the control period is counted with.
@@ -386,6 +398,8 @@ pub enum Refusal {
     TableDiffers,
     /// The stored ripple table cannot be read.
     TableUnreadable,
+    /// The board is in safe mode.
+    SafeMode,
 }
 
 impl fmt::Display for Refusal {
@@ -407,6 +421,7 @@ impl fmt::Display for Refusal {
             Self::TableUnreadable => {
                 f.write_str("the stored ripple table cannot be read; write it anew or clear it first")
             }
+            Self::SafeMode => f.write_str("the board is in safe mode; see bowden faults, then reset it"),
             Self::Busy => f.write_str("the board is busy with the request before; send it again"),
         }
     }

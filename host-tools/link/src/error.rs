@@ -175,7 +175,8 @@ fn advice(refusal: &Refusal) -> &'static str {
         | Refusal::StreamFull
         | Refusal::Busy
         | Refusal::TableDiffers
-        | Refusal::TableUnreadable => "",
+        | Refusal::TableUnreadable
+        | Refusal::SafeMode => "",
     }
 }
 

@@ -33,6 +33,8 @@ pub struct BoardBuilder<'a> {
     mountings: [EncoderMounting; 2],
     motor_reversed: bool,
     parameter_pages: Option<Vec<u8>>,
+    /// Two banks of flash, brown-out level.
+    options: (bool, u8),
 }
 
 impl BoardBuilder<'_> {
@@ -66,6 +68,14 @@ impl BoardBuilder<'_> {
         self
     }
 
+    /// Option bytes: whether the flash has two banks, and the level of the brown-out reset, 0 to 4. The default is that of the
+    /// factory: two banks, level 0.
+    #[must_use]
+    pub fn option_bytes(mut self, two_banks: bool, brown_out_level: u8) -> Self {
+        self.options = (two_banks, brown_out_level);
+        self
+    }
+
     /// Content of the last 16 KiB of flash, as [`Board::flash_image`] gave it; the default is erased.
     #[must_use]
     pub fn flash_image(mut self, content: &[u8]) -> Self {
@@ -82,6 +92,7 @@ impl BoardBuilder<'_> {
         let rtt = Rtt::new(self.elf, image.rtt)?;
         let rig = Rig::new(&self.config, &self.effects, self.mountings, self.motor_reversed, self.seed)?;
         let mut bus = Bus::new(rig);
+        bus.flash.set_options(self.options.0, self.options.1);
         if let Some(content) = self.parameter_pages {
             if content.len() != WRITABLE_FLASH.size as usize {
                 return Err(BoardError::Image(format!(
@@ -175,6 +186,7 @@ impl Board {
             mountings: [amt22(1000), amt22(2000)],
             motor_reversed: false,
             parameter_pages: None,
+            options: (true, 0),
         }
     }
 
@@ -436,6 +448,7 @@ impl Board {
                 Injection::EncoderBus(at) => {
                     machine.bus.stalled_encoders[usize::from(at == EncoderAt::Joint)] = on;
                 }
+                Injection::FlashDamage if on => machine.bus.fetch_damaged(now),
                 Injection::Crystal => machine.bus.set_crystal(!on, now),
                 Injection::HostSilent => machine.bus.host.silent = on,
                 Injection::HostNotReading => machine.bus.host.withheld = on,
@@ -501,6 +514,11 @@ impl Board {
         }
         self.bus_mut().flash.set_content(content);
         Ok(())
+    }
+
+    /// Tears the double word at `offset` of [`Self::flash_image`]: its check bits do not fit, as behind a power cut.
+    pub fn tear_flash_word(&mut self, offset: usize) {
+        self.bus_mut().flash.tear_word(offset);
     }
 
     /// First address of [`Self::flash_image`].

@@ -6,7 +6,7 @@ use virtual_bench::Bridge;
 
 use crate::analog;
 use crate::clock::Clock;
-use crate::error::BoardError;
+use crate::error::{BoardError, Refusal};
 use crate::peripherals::NEVER;
 use crate::peripherals::adc::{Adc, Common, Need};
 use crate::peripherals::advanced_timer::{AdvancedTimer, Leg};
@@ -360,7 +360,30 @@ impl Bus {
 
     /// Whether something asks for the NMI.
     pub(crate) fn nmi(&self) -> bool {
-        self.rcc.nmi()
+        self.rcc.nmi() || self.flash.nmi()
+    }
+
+    /// Reads `size` bytes at `at` of the flash's writable pages; damage breaks TIM1 if SYSCFG says so.
+    pub(crate) fn read_flash(&mut self, at: usize, size: usize, now: u64) -> Result<u64, Refusal> {
+        let was_damaged = self.flash.nmi();
+        let word = self.flash.read_content(at, size)?;
+        if self.flash.nmi() && !was_damaged {
+            self.break_by_flash(now);
+        }
+        Ok(word)
+    }
+
+    /// The core fetches from a damaged word.
+    pub(crate) fn fetch_damaged(&mut self, now: u64) {
+        self.flash.fetch_damaged();
+        self.break_by_flash(now);
+    }
+
+    fn break_by_flash(&mut self, now: u64) {
+        if self.syscfg.breaks_by_flash() {
+            self.tim1.system_break();
+            self.tim1_changed(now);
+        }
     }
 
     /// The crystal stops, or can oscillate again.

@@ -364,10 +364,15 @@ fn map_memories(uc: &mut Uc<'_>) -> Result<(), BoardError> {
         u64::from(WRITABLE_FLASH.size),
         Some(|uc: &mut Uc<'_>, offset: u64, size: usize| {
             let machine = uc.get_data_mut();
-            machine.bus.flash.read_content(offset as usize, size).unwrap_or_else(|refusal| {
+            let now = machine.cycle;
+            let word = machine.bus.read_flash(offset as usize, size, now).unwrap_or_else(|refusal| {
                 machine.refuse(WRITABLE_FLASH.start + offset as u32, "read".to_owned(), "flash", refusal);
                 0
-            })
+            });
+            if machine.bus.nmi() {
+                machine.refresh();
+            }
+            word
         }),
         Some(|uc: &mut Uc<'_>, offset: u64, size: usize, value: u64| {
             let machine = uc.get_data_mut();

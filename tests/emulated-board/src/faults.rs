@@ -82,6 +82,8 @@ pub enum Injection {
     BridgeFault,
     /// The crystal at HSE stops, or does not start.
     Crystal,
+    /// The core fetches from a damaged word of the flash, once.
+    FlashDamage,
     /// A cable loses pretension: what is left of it \[1\].
     Pretension(Cable, f64),
     /// The USB host neither writes nor reads.

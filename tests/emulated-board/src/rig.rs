@@ -229,6 +229,7 @@ impl Rig {
             Injection::EncoderBus(_)
             | Injection::BridgeFault
             | Injection::Crystal
+            | Injection::FlashDamage
             | Injection::HostSilent
             | Injection::HostNotReading => return false,
         }

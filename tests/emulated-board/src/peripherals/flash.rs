@@ -1,7 +1,9 @@
 //! Flash interface: latency, unlock, page erase and double-word programming of bank 2, power cuts (RM0440, FLASH).
 //!
-//! The bytes kept here are the last 16 KiB. Times are the typical ones of DS12288. Not modelled: fast programming, mass
-//! erase, option bytes (DBANK reads 1), ECC; a torn double word reads as what was programmed of it.
+//! The bytes kept here are the last 16 KiB. Times are the typical ones of DS12288. What a power cut tears has two wrong bits or
+//! more by its check bits: a read gives what was programmed of it, sets ECCD and raises the NMI (RM0440, 5.3.4), but for a read
+//! of the line that was read last. Programming such a word is an error but for zeros; erasing its page mends it. Not modelled: fast
+//! programming, mass erase, single wrong bits, programming of option bytes, writing to a flash of one bank.
 
 use super::NEVER;
 use crate::error::{Refusal, only};
@@ -26,6 +28,10 @@ const ERRORS: u32 = 0xc3fa;
 const LOCK: u32 = 1 << 31;
 const OPTION_LOCK: u32 = 1 << 30;
 const START: u32 = 1 << 16;
+const DAMAGE: u32 = 1 << 31;
+/// Option bytes as they leave the factory (RM0440, `FLASH_OPTR`): two banks, brown-out level 0.
+const FACTORY_OPTIONS: u32 = 0xffef_f8aa;
+const TWO_BANKS: u32 = 1 << 22;
 
 /// What an armed power cut leaves of the operation it interrupts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +57,12 @@ enum Operation {
 pub(crate) struct Flash {
     /// Content of the writable pages.
     content: Vec<u8>,
+    /// Double words whose check bits do not fit.
+    torn: Vec<bool>,
+    /// Double word in the buffer of the last read.
+    buffered: Option<usize>,
+    eccr: u32,
+    options: u32,
     acr: u32,
     keys_seen: u32,
     key_fault: bool,
@@ -69,6 +81,10 @@ impl Flash {
     pub(crate) fn new() -> Self {
         Self {
             content: vec![0xff; WRITABLE_FLASH.size as usize],
+            torn: vec![false; WRITABLE_FLASH.size as usize / 8],
+            buffered: None,
+            eccr: 0,
+            options: FACTORY_OPTIONS,
             acr: 0x0004_0600,
             keys_seen: 0,
             key_fault: false,
@@ -90,6 +106,8 @@ impl Flash {
         let kept = Self::new();
         *self = Self {
             content: std::mem::take(&mut self.content),
+            torn: std::mem::take(&mut self.torn),
+            options: self.options,
             operations: self.operations,
             cut: self.cut,
             ..kept
@@ -101,9 +119,33 @@ impl Flash {
         &self.content
     }
 
-    /// Replaces the content.
+    /// Replaces the content, all of it whole.
     pub(crate) fn set_content(&mut self, content: &[u8]) {
         self.content.copy_from_slice(content);
+        self.torn.fill(false);
+    }
+
+    /// Sets the number of banks, 1 or 2, and the brown-out level, 0 to 4, in the option bytes.
+    pub(crate) fn set_options(&mut self, two_banks: bool, brown_out_level: u8) {
+        self.options = FACTORY_OPTIONS & !(TWO_BANKS | 7 << 8) | u32::from(brown_out_level & 7) << 8;
+        if two_banks {
+            self.options |= TWO_BANKS;
+        }
+    }
+
+    /// Tears the double word at `at` of the writable pages.
+    pub(crate) fn tear_word(&mut self, at: usize) {
+        self.torn[at / 8] = true;
+    }
+
+    /// The core meets a damaged word in bank 1, where the code is.
+    pub(crate) fn fetch_damaged(&mut self) {
+        self.eccr = DAMAGE | 0x1_2340;
+    }
+
+    /// Whether a read met damage that the firmware has not taken note of, which asks for the NMI.
+    pub(crate) fn nmi(&self) -> bool {
+        self.eccr & DAMAGE != 0
     }
 
     /// Erases and double-word writes begun so far.
@@ -158,8 +200,13 @@ impl Flash {
 
     fn complete(&mut self, operation: &Operation) {
         match operation {
-            Operation::Erase { at } => self.content[*at..at + PAGE_BYTES].fill(0xff),
+            Operation::Erase { at } => {
+                self.content[*at..at + PAGE_BYTES].fill(0xff);
+                self.torn[at / 8..(at + PAGE_BYTES) / 8].fill(false);
+            }
             Operation::Program { at, data } => {
+                // Zeros have check bits of their own, whatever was there.
+                self.torn[at / 8] = false;
                 for (old, new) in self.content[*at..at + 8].iter_mut().zip(data) {
                     *old &= new;
                 }
@@ -169,6 +216,11 @@ impl Flash {
 
     /// Leaves half of `operation`: bits chosen by its address and number, so that runs repeat.
     fn tear(&mut self, operation: &Operation) {
+        let (first, bytes) = match operation {
+            Operation::Erase { at } => (*at, PAGE_BYTES),
+            Operation::Program { at, .. } => (*at, 8),
+        };
+        let before = self.content[first..first + bytes].to_vec();
         let mut mixed = self.operations.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut random_byte = || {
             mixed = mixed.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(1);
@@ -186,6 +238,14 @@ impl Flash {
                     *old &= new | random_byte();
                 }
             }
+        }
+        for (k, old) in before.chunks_exact(8).enumerate() {
+            let at = first + 8 * k;
+            let now = &self.content[at..at + 8];
+            self.torn[at / 8] = match operation {
+                Operation::Erase { .. } => now.iter().any(|byte| *byte != 0xff),
+                Operation::Program { data, .. } => now != data && now != old,
+            };
         }
     }
 
@@ -218,12 +278,18 @@ impl Flash {
     }
 
     /// Reads `size` bytes at `at` of the writable pages.
-    pub(crate) fn read_content(&self, at: usize, size: usize) -> Result<u64, Refusal> {
+    pub(crate) fn read_content(&mut self, at: usize, size: usize) -> Result<u64, Refusal> {
         if self.running.is_some() {
             return Err(Refusal::because(
                 "a read of the bank that is being erased or programmed stalls the core",
             ));
         }
+        let word = at / 8;
+        if self.torn[word] && self.buffered != Some(word) && self.eccr & DAMAGE == 0 {
+            let in_bank = (WRITABLE_FLASH.start as usize + 8 * word) & 0x3_ffff;
+            self.eccr = DAMAGE | 1 << 21 | in_bank as u32;
+        }
+        self.buffered = Some(word);
         Ok((0..size).fold(0, |value, k| value | u64::from(self.content[at + k]) << (8 * k)))
     }
 
@@ -265,7 +331,8 @@ impl Flash {
         let mut data = [0; 8];
         data[..4].copy_from_slice(&first.to_le_bytes());
         data[4..].copy_from_slice(&value.to_le_bytes());
-        let erased = self.content[first_at..first_at + 8].iter().all(|byte| *byte == 0xff);
+        let erased =
+            !self.torn[first_at / 8] && self.content[first_at..first_at + 8].iter().all(|byte| *byte == 0xff);
         // An all-zero double word may be programmed over anything.
         if !erased && data != [0; 8] {
             self.sr |= PROGRAMMING_ERROR;
@@ -279,10 +346,11 @@ impl Flash {
     pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
         Ok(match offset {
             0x00 => self.acr,
-            0x04 | 0x08 | 0x0c | 0x18 => 0,
+            0x04 | 0x08 | 0x0c => 0,
             0x10 => self.sr,
             0x14 => self.cr,
-            0x20 => 0xffef_f8aa,
+            0x18 => self.eccr,
+            0x20 => self.options,
             _ => return Err(Refusal::no_register(offset)),
         })
     }
@@ -308,6 +376,13 @@ impl Flash {
                 self.sr &= !(value & (ERRORS | END_OF_OPERATION));
             }
             0x14 => self.write_control(value, now, hclk_hz)?,
+            0x18 => {
+                // Address and bank are read only.
+                only("ECCR", value, DAMAGE | 0x002f_ffff)?;
+                if value & DAMAGE != 0 {
+                    self.eccr = 0;
+                }
+            }
             _ => return Err(Refusal::no_register(offset)),
         }
         Ok(())
@@ -325,6 +400,11 @@ impl Flash {
         only("CR", value & !(LOCK | OPTION_LOCK), 0x0301_0bfb)?;
         if self.running.is_some() {
             return Err(Refusal::because("CR must not be written while BSY is set"));
+        }
+        if self.options & TWO_BANKS == 0 && value & 3 != 0 {
+            return Err(Refusal::because(
+                "writing to a flash of one bank, which code runs from, stalls the core",
+            ));
         }
         self.cr = value & !START | OPTION_LOCK;
         if value & LOCK != 0 {
@@ -447,6 +527,46 @@ mod tests {
             let word = flash.read_content(8, 8).expect("idle");
             assert!(check(word), "{torn:?}: {word:#x}");
         }
+    }
+
+    #[test]
+    fn a_torn_word_is_damage_until_its_page_is_erased() {
+        let mut flash = unlocked();
+        flash.arm_cut(1, Torn::Half);
+        programmed(&mut flash, 0, 0x00ff_00ff, 0x00ff_00ff, 0);
+        assert!(flash.take_power_loss());
+        flash.reset();
+        let word = flash.read_content(0, 8).expect("idle");
+        assert!(flash.nmi() && word & 0x00ff_00ff_00ff_00ff == 0x00ff_00ff_00ff_00ff, "{word:#x}");
+        // Bank 2, address in the bank.
+        assert_eq!(flash.read(0x18), Ok(DAMAGE | 1 << 21 | 0x3_c000));
+        flash.write(0x18, DAMAGE, 0, HZ).expect("ECCR");
+        flash.read_content(0, 4).expect("idle");
+        assert!(!flash.nmi(), "the line is buffered");
+        flash.read_content(8, 4).expect("idle");
+        flash.read_content(4, 4).expect("idle");
+        assert!(flash.nmi());
+        flash.write(0x18, DAMAGE, 0, HZ).expect("ECCR");
+        // It is not erased either, whatever its bits are, and zeros may go over it.
+        let mut flash = unlocked();
+        flash.tear_word(0);
+        programmed(&mut flash, 0, 1, 2, 0);
+        assert_eq!(flash.read(0x10), Ok(PROGRAMMING_ERROR));
+        flash.write(0x10, PROGRAMMING_ERROR, 0, HZ).expect("SR");
+        flash.write(0x14, 2 | 120 << 3 | 1 << 11 | START, 0, HZ).expect("CR");
+        flash.advance(30_000);
+        flash.read_content(8, 4).expect("idle");
+        flash.read_content(0, 4).expect("idle");
+        assert!(!flash.nmi(), "erased");
+    }
+
+    #[test]
+    fn option_bytes_say_banks_and_brown_out_level() {
+        let mut flash = Flash::new();
+        assert_eq!(flash.read(0x20).map(|options| (options >> 22 & 1, options >> 8 & 7)), Ok((1, 0)));
+        flash.set_options(false, 4);
+        flash.reset();
+        assert_eq!(flash.read(0x20).map(|options| (options >> 22 & 1, options >> 8 & 7)), Ok((0, 4)));
     }
 
     #[test]

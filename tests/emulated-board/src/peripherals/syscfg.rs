@@ -23,6 +23,11 @@ impl Syscfg {
         (self.exticr[usize::from(line / 4)] >> (4 * (line % 4)) & 0xf) as usize
     }
 
+    /// Whether two wrong bits of the flash break (ECCL).
+    pub(crate) fn breaks_by_flash(&self) -> bool {
+        self.cfgr2 & 8 != 0
+    }
+
     /// Value of the register at `offset`.
     pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
         Ok(match offset {

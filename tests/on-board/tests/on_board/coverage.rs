@@ -3,9 +3,10 @@
 use bowden_link::Fault;
 
 /// Sources of the tests that provoke faults.
-const SOURCES: [&str; 5] = [
+const SOURCES: [&str; 6] = [
     include_str!("faults.rs"),
     include_str!("failures.rs"),
+    include_str!("flash.rs"),
     include_str!("parameters.rs"),
     include_str!("clock.rs"),
     include_str!("ripple_table.rs"),
@@ -35,6 +36,9 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::Panic => "a_panic_stops_the_motor_and_leaves_its_words",
         Fault::HardFault => "a_processor_fault_stops_the_motor_and_says_where",
         Fault::ClockFailed => "a_crystal_that_stops_opens_the_bridge_at_once_and_is_a_named_fault",
+        Fault::FlashDamaged => "damaged_code_opens_the_bridge_and_is_a_named_fault",
+        Fault::FlashBanks => "a_flash_of_one_bank_is_told_and_nothing_is_stored",
+        Fault::RestartLoop => "three_restarts_without_a_host_end_in_safe_mode",
         Fault::SelfTestTimeout => "a_restless_sensor_ends_the_self_test",
         Fault::PretensionOff => "lost_pretension_is_found_before_the_bridge_is_on",
         Fault::HomingTimeout => "homing_that_does_not_arrive_ends",

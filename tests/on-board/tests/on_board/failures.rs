@@ -1,10 +1,10 @@
 //! Failures of the firmware itself, provoked by the host: panic, processor fault, hang, late tick.
 
-use bowden_board::ResetCause;
+use bowden_board::{Board, ResetCause};
 use bowden_link::message::{Boot, Goal, Provocation, Refusal};
 use bowden_link::{Fault, FromBoard, State, ToBoard};
 use bowden_on_board_tests::host::Host;
-use bowden_on_board_tests::{Outcome, fail};
+use bowden_on_board_tests::{Outcome, fail, image};
 
 use crate::stop::{PERIOD_S, moving, stopped, until_open};
 use crate::switched_on;
@@ -100,6 +100,65 @@ fn a_processor_fault_stops_the_motor_and_says_where() -> Outcome {
 fn a_hang_ends_with_the_watchdog_and_the_motor_is_off_long_before() -> Outcome {
     let text = end_of_run(Provocation::Hang, Boot::Watchdog, Fault::Watchdog)?;
     assert_eq!(text, "");
+    Ok(())
+}
+
+/// Holds the core until the watchdog bites, nobody being there to hear of it.
+fn bitten(board: &mut Board) -> Outcome {
+    let boots = board.counters().boots;
+    board.stall_core(true);
+    while board.counters().boots == boots {
+        board.run_for(1e-3)?;
+    }
+    board.stall_core(false);
+    Ok(board.run_for(0.02)?)
+}
+
+#[test]
+fn three_restarts_without_a_host_end_in_safe_mode() -> Outcome {
+    let mut board = Board::builder(&image::firmware()?).build()?;
+    board.set_usb_plugged(false);
+    board.run_for(0.02)?;
+    for _ in 0..3 {
+        bitten(&mut board)?;
+    }
+    board.set_usb_plugged(true);
+    let mut host = Host::connect(board)?;
+    assert!(host.greet()?.chip.is_safe());
+    let status = host.status()?;
+    let record = status.fault.expect("a fault");
+    assert_eq!((status.state, record.fault, record.got), (State::Fault, Fault::RestartLoop, 3.0), "{record}");
+    // The timer of the bridge was not even switched on, and nothing reaches tick or flash.
+    assert_eq!((host.board.pwm().duty, host.board.pwm().enabled, host.ticks.begun), (None, false, 0));
+    for order in [
+        ToBoard::Enter(Goal::ClearFault),
+        ToBoard::Enter(Goal::Ready),
+        ToBoard::WriteParameter { index: 0, value: 4.0 },
+        ToBoard::StoreParameters,
+    ] {
+        assert_eq!(host.ask(&order)?, FromBoard::Refused(Refusal::SafeMode), "{order:?}");
+    }
+    assert_eq!(host.board.flash_operations(), 0);
+    // The watchdog is content, and a host was there: the next reset starts the board as usual.
+    host.run(0.5)?;
+    assert_eq!(host.board.counters().boots, 4);
+    let greeting = host.reset(ResetCause::Pin)?;
+    assert_eq!((greeting.chip.restarts, host.status()?.fault), (0, None));
+    host.make_ready()
+}
+
+#[test]
+fn restarts_that_a_host_saw_do_not_add_up() -> Outcome {
+    let mut host = switched_on(1)?;
+    for boots in 1..5 {
+        host.board.stall_core(true);
+        while host.board.counters().boots == boots {
+            host.pass(1e-3)?;
+        }
+        host.board.stall_core(false);
+        assert_eq!(host.await_reset(boots, 0.1)?.chip.restarts, 1);
+        assert_eq!(host.status()?.fault.map(|record| record.fault), Some(Fault::Watchdog));
+    }
     Ok(())
 }
 

@@ -11,6 +11,7 @@ mod determinism;
 mod directions;
 mod failures;
 mod faults;
+mod flash;
 mod load;
 mod modes;
 mod monitor;
