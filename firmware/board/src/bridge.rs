@@ -43,6 +43,7 @@ const BREAK_FILTER: FilterValue = FilterValue::FDTS_DIV8_N8;
 /// The bridge, off after [`Self::new`].
 pub struct Bridge {
     enable: Output<'static>,
+    awake: bool,
     on: bool,
 }
 
@@ -94,7 +95,7 @@ impl Bridge {
         forget((High::<Ch1>::new(leg_a.0, kind), Low::<Ch1>::new(leg_a.1, kind)));
         forget((High::<Ch2>::new(leg_b.0, kind), Low::<Ch2>::new(leg_b.1, kind)));
         restart(divider);
-        Self { enable, on: false }
+        Self { enable, awake: false, on: false }
     }
 
     /// Whether the bridge reports a fault, or has since it was switched on.
@@ -104,8 +105,8 @@ impl Bridge {
         status.bif(0) || status.sbif()
     }
 
-    /// Duty of the coming PWM period and on or off; off acts at once.
-    pub fn set(&mut self, duty_raw: i16, on: bool) {
+    /// Duty of the coming PWM period, gate driver awake or not, and bridge on or off; off acts at once.
+    pub fn set(&mut self, duty_raw: i16, awake: bool, on: bool) {
         let offset = (HALF_PERIOD * i32::from(duty_raw)) >> 15;
         pac::TIM1.ccr(0).write(|compare| compare.set_ccr((HALF_PERIOD + offset) as u16));
         pac::TIM1.ccr(1).write(|compare| compare.set_ccr((HALF_PERIOD - offset) as u16));
@@ -119,7 +120,10 @@ impl Bridge {
         if on != self.on {
             self.on = on;
             pac::TIM1.bdtr().modify(|protection| protection.set_moe(on));
-            self.enable.set_level(on.into());
+        }
+        if awake != self.awake {
+            self.awake = awake;
+            self.enable.set_level(awake.into());
         }
     }
 

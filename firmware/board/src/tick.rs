@@ -111,7 +111,7 @@ impl Tick {
         let number = self.controller.tick_count();
         let mut orders = Orders { ends: &mut self.ends, late_permille: self.late_permille.take() };
         let output = self.controller.tick(&input, &mut orders);
-        self.bridge.set(output.duty_raw, output.bridge_on);
+        self.bridge.set(output.duty_raw, output.driver_on, output.bridge_on);
         let ring = &retained::memory().snapshot;
         ring.push(number, &output.sample);
         if let Some(record) = output.tripped {

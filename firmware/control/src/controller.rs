@@ -147,7 +147,13 @@ impl Controller {
             state,
             limits,
         };
-        TickOutput { duty_raw: action.duty_raw, bridge_on: state.drives(), sample, tripped }
+        TickOutput {
+            duty_raw: action.duty_raw,
+            bridge_on: state.drives(),
+            driver_on: self.supervisor.wakes_driver(),
+            sample,
+            tripped,
+        }
     }
 
     fn take(&mut self, command: &Command) -> Option<Detection> {
@@ -235,8 +241,8 @@ impl Controller {
         let sheath = self.sheaths.observe(&config.sheath, &measured);
         let load = if motor_side { torque_in } else { self.observer.load(&config.observer) };
         let found = if self.supervisor.watches() {
-            let bridge =
-                input.bridge_fault.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
+            let heard = input.bridge_fault && self.supervisor.hears_driver(&config.supervisor);
+            let bridge = heard.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
             let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
             let encoder = pulley.fault.map(|bad| of(0, bad)).or_else(|| joint.fault.map(|bad| of(1, bad)));
             bridge.or(supply.found).or(encoder).or(tension).or_else(|| self.stand_still(counts))

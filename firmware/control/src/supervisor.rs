@@ -18,7 +18,9 @@
 //! | homing timeout | | | | | x | |
 //! | tick overrun, host silent, store, watchdog, panic (as [`crate::tick::Command::Trip`]) | x | x | x | x | x | x |
 //!
-//! Off is left alone because benches are wired, powered and loosened then. In the self test and the pretension check a
+//! Off is left alone because benches are wired, powered and loosened then.
+//! The gate driver is switched on with the self test and off in off and fault; what its fault line says while it wakes does not
+//! count. In the self test and the pretension check a
 //! slack tendon is told as [`Fault::PretensionOff`], which says what to do. Stuck encoders need motion.
 
 pub mod rest;
@@ -54,6 +56,8 @@ pub const fn allows(state: State, goal: Goal) -> bool {
 pub struct SupervisorConfig {
     /// Ticks of a look at the sensors at rest.
     pub rest_ticks: u16,
+    /// Ticks that the gate driver needs to wake, which it does in the self test.
+    pub wake_ticks: u32,
     /// Ticks in which the self test has to pass.
     pub self_test_ticks: u32,
     /// Largest variance of a tension at rest, codes², in 2⁻⁸.
@@ -130,6 +134,18 @@ impl Supervisor {
         !matches!(self.state, State::Off | State::Fault)
     }
 
+    /// Whether the gate driver is on: from the self test on, so that it is awake long before the first duty.
+    #[must_use]
+    pub const fn wakes_driver(&self) -> bool {
+        self.watches()
+    }
+
+    /// Whether its fault line counts: not while it wakes.
+    #[must_use]
+    pub const fn hears_driver(&self, config: &SupervisorConfig) -> bool {
+        self.watches() && !(matches!(self.state, State::SelfTest) && self.elapsed < config.wake_ticks)
+    }
+
     /// Which faults of the tensions count.
     #[must_use]
     pub const fn tension_checks(&self) -> TensionChecks {
@@ -201,7 +217,7 @@ impl Supervisor {
                 let verdict = self.rest.look(config, situation)?;
                 self.rest = rest::RestLook::default();
                 match verdict.restless {
-                    None => self.change(State::PretensionCheck),
+                    None if self.elapsed >= config.wake_ticks => self.change(State::PretensionCheck),
                     Some(channel) if self.elapsed >= config.self_test_ticks => {
                         let seconds = |ticks: u32| ticks as f32 * config.period_s;
                         return Some(Detection::new(
@@ -211,7 +227,7 @@ impl Supervisor {
                             seconds(config.self_test_ticks),
                         ));
                     }
-                    Some(_) => {}
+                    _ => {}
                 }
                 None
             }

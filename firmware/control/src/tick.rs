@@ -40,6 +40,8 @@ pub struct TickOutput {
     pub duty_raw: i16,
     /// Whether the bridge is on.
     pub bridge_on: bool,
+    /// Whether its gate driver is to be awake; it is long before the bridge goes on.
+    pub driver_on: bool,
     /// All signals of this tick.
     pub sample: Sample,
     /// The fault, in the tick of its detection only; the bridge is off in that tick already.

@@ -328,7 +328,7 @@ impl Board {
     pub fn pwm(&self) -> PwmState {
         let bus = self.bus();
         let leg = |index| match bus.leg(index) {
-            Leg::Switching(high) if bus.bridge_enabled() => Some(high),
+            Leg::Switching(high) if bus.driver_is_awake() => Some(high),
             _ => None,
         };
         let first_two = |values: [u32; 6]| [values[0], values[1]];

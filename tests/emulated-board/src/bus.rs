@@ -30,6 +30,9 @@ use crate::usb_host::UsbHost;
 use crate::wiring;
 
 const PORTS: usize = 7;
+/// Time from the enable pin of the gate driver to its first switching \[s\]; its fault line is low meanwhile (DRV8305: power-up of
+/// its regulators and charge pump, some milliseconds).
+const DRIVER_WAKE_S: f64 = 10.0e-3;
 /// DMAMUX request ids (RM0440, DMAMUX input table).
 const REQUEST_ADC: [u32; 2] = [5, 36];
 const REQUEST_SPI: [[u32; 2]; 2] = [[10, 11], [14, 15]];
@@ -79,6 +82,10 @@ pub(crate) struct Bus {
     /// What happened so far.
     pub trace: Trace,
     bridge_fault: bool,
+    driver_enabled: bool,
+    driver_awake: bool,
+    /// Cycle at which the gate driver is awake.
+    driver_wakes: u64,
     /// Encoders whose SPI asks DMA for nothing.
     pub stalled_encoders: [bool; 2],
     /// A reset that a peripheral asks for.
@@ -118,6 +125,9 @@ impl Bus {
             rig,
             trace: Trace::new(),
             bridge_fault: false,
+            driver_enabled: false,
+            driver_awake: false,
+            driver_wakes: NEVER,
             stalled_encoders: [false; 2],
             reset_request: None,
             failure: None,
@@ -196,6 +206,7 @@ impl Bus {
         timers
             .min(self.tim1.next_event())
             .min(self.tim1.break_event())
+            .min(self.driver_wakes)
             .min(self.adc[0].next_event())
             .min(self.adc[1].next_event())
             .min(self.spi[0].next_event())
@@ -219,6 +230,11 @@ impl Bus {
         if self.tim1.break_event() <= at {
             self.tim1.pass_break();
             self.tim1_changed(at);
+        }
+        if self.driver_wakes <= at {
+            self.driver_wakes = NEVER;
+            self.driver_awake = true;
+            self.drive_fault_pin(at);
         }
         for index in 0..2 {
             if self.adc[index].next_event() <= at {
@@ -434,16 +450,33 @@ impl Bus {
         }
         self.update_break_pin(now);
         self.bridge_changed(now);
+        if self.driver_enabled != self.bridge_enabled() {
+            self.driver_enabled = !self.driver_enabled;
+            self.driver_awake = false;
+            self.driver_wakes =
+                if self.driver_enabled { self.clock.cycle_at(at_s + DRIVER_WAKE_S) } else { NEVER };
+            self.drive_fault_pin(now);
+        }
+    }
+
+    /// Whether the gate driver pulls its fault line low: a fault, or it is not awake yet.
+    fn fault_line_is_low(&self) -> bool {
+        self.bridge_fault || self.driver_enabled && !self.driver_awake
+    }
+
+    /// Whether the gate driver follows its inputs.
+    pub(crate) fn driver_is_awake(&self) -> bool {
+        self.driver_awake
     }
 
     fn update_break_pin(&mut self, now: u64) {
         let connected = self.pin_mode(wiring::BRIDGE_FAULT) == Mode::Alternate(wiring::BRIDGE_ALTERNATE);
-        self.tim1.set_break_pin(!(connected && self.bridge_fault), now);
+        self.tim1.set_break_pin(!(connected && self.fault_line_is_low()), now);
     }
 
     fn drive_fault_pin(&mut self, now: u64) {
         let pin = wiring::BRIDGE_FAULT;
-        let level = !self.bridge_fault;
+        let level = !self.fault_line_is_low();
         self.gpio[pin.port_index()].drive(pin.number, Some(level));
         if self.syscfg.exti_port(pin.number) == pin.port_index() && now > 0 {
             self.exti.edge(pin.number, level);
@@ -474,8 +507,8 @@ impl Bus {
     }
 
     fn bridge_changed(&mut self, now: u64) {
-        // The driver pulls floating inputs down, and does not listen to them while it is not enabled.
-        let switches = |leg| matches!(leg, Leg::Switching(_)) && self.bridge_enabled();
+        // The driver pulls floating inputs down, and does not listen to them while it is not awake.
+        let switches = |leg| matches!(leg, Leg::Switching(_)) && self.driver_is_awake();
         let legs = [self.leg(0), self.leg(1)];
         if legs.into_iter().any(switches) && self.tim1.dead_time_raw() == 0 {
             self.fail(BoardError::Part {
@@ -486,7 +519,7 @@ impl Bus {
         }
         // One leg alone carries no current.
         let bridge = match legs {
-            [Leg::Switching(a), Leg::Switching(b)] if self.bridge_enabled() => Bridge::Duty(a - b),
+            [Leg::Switching(a), Leg::Switching(b)] if self.driver_is_awake() => Bridge::Duty(a - b),
             _ => Bridge::Open,
         };
         let now_s = self.seconds(now);

@@ -242,6 +242,7 @@ fn supervisor(parameters: &Parameters, period_s: f32) -> SupervisorConfig {
     };
     SupervisorConfig {
         rest_ticks: ticks(supervisor.self_test_time, period_s),
+        wake_ticks: long_ticks(parameters.bridge.wake_time, period_s),
         self_test_ticks: long_ticks(supervisor.self_test_timeout, period_s),
         noise_limit: [&tension.f1, &tension.f2, &tension.f3, &tension.f4]
             .map(|channel| variance(channel.gain)),

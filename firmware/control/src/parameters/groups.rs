@@ -20,6 +20,8 @@ pub struct Bridge {
     pub current_gain: f32,
     /// Bus voltage a code, V/code.
     pub bus_gain: f32,
+    /// Time that the gate driver needs from its enable pin to its first switching, s; its fault line means nothing before.
+    pub wake_time: f32,
 }
 
 /// Motor and gear.

@@ -155,4 +155,5 @@ parameter_table! {
     impedance.gravity, "", 0.0, 1.2, 1.0, true;
     correction.ripple_table.enable, "", 0.0, 1.0, 0.0, true;
     correction.ripple_table.limit, "N·m", 0.0, 20.0, 0.5, true;
+    bridge.wake_time, "s", 0.0, 1.0, 0.02, true;
 }

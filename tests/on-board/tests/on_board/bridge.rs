@@ -1,7 +1,8 @@
 //! The bridge's fault line acts in hardware: no instruction of the firmware is needed.
 
 use bowden_board::{Injection, TICK_MARKER};
-use bowden_link::{Fault, State};
+use bowden_link::message::Goal;
+use bowden_link::{Fault, State, ToBoard};
 use bowden_on_board_tests::Outcome;
 use bowden_on_board_tests::host::Host;
 
@@ -104,4 +105,38 @@ fn protection_of_the_bridge_is_locked() -> Outcome {
     // Level 3 protects dead time, polarities, off states, break and output modes until the next reset.
     assert_eq!(pwm.lock_level, 3);
     Ok(())
+}
+
+#[test]
+fn the_gate_driver_is_awake_before_the_bridge_goes_on_and_its_fault_line_counts_from_then_on() -> Outcome {
+    let mut host = switched_on(1)?;
+    // Off: asleep.
+    assert!(!host.board.pwm().enabled);
+    host.order(&ToBoard::Enter(Goal::Ready))?;
+    // Its fault line is low while it wakes, for 10 ms.
+    host.run(5e-3)?;
+    assert!(host.board.pwm().enabled && !host.board.pwm().main_output);
+    assert_eq!(host.status()?.state, State::SelfTest);
+    host.reach(State::Ready, 3.0)?;
+    host.board.inject(Injection::BridgeFault);
+    let record = host.await_fault(0.1)?;
+    assert_eq!(record.fault, Fault::BridgeFault, "{record}");
+    assert!(!host.board.pwm().enabled, "asleep behind a fault");
+    Ok(())
+}
+
+#[test]
+fn a_gate_driver_that_takes_longer_than_its_parameter_says_is_a_fault() -> Outcome {
+    let mut host = switched_on(1)?;
+    host.set("bridge.wake_time", 0.005)?;
+    host.order(&ToBoard::Enter(Goal::Ready))?;
+    assert_eq!(host.await_fault(0.1)?.fault, Fault::BridgeFault);
+    host.order(&ToBoard::Enter(Goal::ClearFault))?;
+    host.reach(State::Off, 0.01)?;
+    // Longer than a look of the self test: the test waits for it.
+    host.set("bridge.wake_time", 0.3)?;
+    host.order(&ToBoard::Enter(Goal::Ready))?;
+    host.run(0.25)?;
+    assert_eq!(host.status()?.state, State::SelfTest);
+    host.reach(State::Ready, 1.0).map(|_| ())
 }
