@@ -40,6 +40,8 @@ enum Command {
     Diagnose(crate::commands::diagnose::DiagnoseArguments),
     /// Write a recording in another format
     Convert(ConvertArguments),
+    /// Show what is in recordings: rate, gaps, faults, ranges, who made them, and a curve
+    Info(crate::commands::info::InfoArguments),
     /// Take everything whole out of a recording that was cut or damaged
     Recover(crate::commands::recover::RecoverArguments),
     /// Simulate a rig with what went into a recording
@@ -96,6 +98,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Check(arguments) => arguments.run(),
         Command::Diagnose(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Convert(arguments) => arguments.run(),
+        Command::Info(arguments) => arguments.run(),
         Command::Recover(arguments) => arguments.run(),
         Command::Replay(arguments) => arguments.run(),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),

@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod effect;
 pub mod faults;
 pub mod fit;
+pub mod info;
 pub mod investigate;
 mod limits;
 pub mod monitor;
@@ -49,6 +50,13 @@ pub fn print(text: &str) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Writes facts to standard output as JSON.
+fn print_json(facts: &impl serde::Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(facts)
+        .map_err(|error| Failure::failed(format!("standard output: no JSON: {error}; please report this")))?;
+    print(&(text + "\n"))
 }
 
 /// The study that a command line names: a study file, or recordings with the rig of their bench.

@@ -2,8 +2,10 @@
 //! with a driver board, by `bowden_host_link`.
 #![forbid(unsafe_code)]
 
+mod chart;
 pub mod cli;
 pub mod commands;
+pub mod facts;
 pub mod interrupt;
 pub mod monitor;
 pub mod progress;

@@ -557,7 +557,7 @@ fn an_output_that_cannot_be_is_refused_before_the_input_is_read() {
     assert_refused(
         at,
         &["convert", "in.csv", "out.xlsx"],
-        "out.xlsx: unknown format; end the name in .csv, .csv.gz or .mcap",
+        "out.xlsx: unknown format; end the name in .csv, .csv.gz, .mcap or .parquet",
     );
     assert_eq!(fs::read(at.join("in.csv")).unwrap(), b"broken");
 }

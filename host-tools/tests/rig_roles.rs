@@ -145,7 +145,7 @@ fn commands_check_their_files_before_their_work() {
         ),
         (
             "replay @/rec.csv --rig @/rig.toml --out @/p.txt",
-            "@/p.txt: unknown format; end the name in .csv, .csv.gz or .mcap",
+            "@/p.txt: unknown format; end the name in .csv, .csv.gz, .mcap or .parquet",
         ),
         (
             "fit @/rec.csv --rig @/rig.toml --out @/rig.toml",

@@ -1,4 +1,4 @@
-//! Recordings: a table with one row a sample, from and to CSV, gzipped CSV and MCAP.
+//! Recordings: a table with one row a sample, from and to CSV, gzipped CSV, MCAP and Parquet.
 //!
 //! A recording holds the time `t_s`, strictly increasing, and columns. A column whose name is a role of
 //! [`Channel`], or that a rig's [`ColumnMap`] assigns to one, is read as numbers; any other is kept as the text that
@@ -18,6 +18,7 @@ mod gzip_members;
 mod mcap_file;
 mod metadata;
 mod origin;
+mod parquet_file;
 mod place;
 mod recover;
 mod row;
@@ -302,6 +303,14 @@ impl Recording {
     /// What the file says beside the rows; it is kept where the recording is written as MCAP.
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
+    }
+
+    /// Unit of a column, where it is known.
+    pub fn unit(&self, column: &Column) -> Option<&str> {
+        match column {
+            Column::Known { channel, .. } => Some(channel.unit()),
+            Column::Unknown(text) => self.units.get(text.name()).map(String::as_str),
+        }
     }
 
     /// Says something else beside the rows.

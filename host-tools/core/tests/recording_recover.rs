@@ -194,7 +194,10 @@ fn a_flipped_byte_costs_one_chunk_at_most() {
                 && missing > 0
                 && finished
             {
-                assert!(line.contains(&format!(": {missing} rows ")), "{what}: {line}");
+                // Behind the last whole row nothing says how many there were.
+                let last = part.t_s().last() != whole.t_s().last();
+                let said = if last { "may be missing".to_owned() } else { format!(": {missing} rows ") };
+                assert!(line.contains(&said), "{what}: {line}");
             }
             // A plain reader never takes damaged bytes for values.
             if let Ok(read) = Recording::load(&damaged_path, &ReadOptions::default()) {

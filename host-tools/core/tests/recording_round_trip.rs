@@ -51,7 +51,7 @@ fn values_keep_every_bit_through_every_format() {
     let recording = Recording::new("made", t_s.clone()).with(Channel::F2, values.clone());
     let folder = tempfile::tempdir().unwrap();
     let mut last = recording;
-    for name in ["a.csv", "b.mcap", "c.csv", "d.csv.gz", "e.mcap", "f.csv"] {
+    for name in ["a.csv", "b.mcap", "c.csv", "d.csv.gz", "p.parquet", "e.mcap", "f.csv"] {
         let path = folder.path().join(name);
         last.save(&path).unwrap();
         last = load(&path);
@@ -90,7 +90,7 @@ fn what_is_not_interpreted_keeps_every_letter_and_its_place() {
     let first = folder.path().join("a.csv");
     fs::write(&first, text).unwrap();
     let mut last = load(&first);
-    for name in ["b.mcap", "c.csv", "d.mcap", "e.csv.gz"] {
+    for name in ["b.mcap", "c.csv", "d.mcap", "p.parquet", "e.csv.gz"] {
         let path = folder.path().join(name);
         last.save(&path).unwrap();
         last = load(&path);

@@ -52,7 +52,7 @@ impl Capture<'_> {
     pub fn recorder(&self, session: &Session) -> Result<Recorder, Failure> {
         let parameters = session.parameters();
         let beside = match self.format {
-            Format::Mcap => Vec::new(),
+            Format::Mcap | Format::Parquet => Vec::new(),
             Format::Csv | Format::GzippedCsv => vec![(sidecar(self.out), parameters.to_toml())],
         };
         let conversion = Conversion::new(parameters)?;

@@ -8,7 +8,8 @@ use bowden_core::recording::{Column, ReadOptions, Recording};
 use bowden_core::rig::Rig;
 use bowden_core::study::{LoadedStudy, Role, Study};
 
-use super::{load_study, outcome_of, print};
+use super::{load_study, outcome_of, print, print_json};
+use crate::facts::Facts;
 
 /// Arguments of `bowden check`.
 #[derive(Clone, Debug, clap::Args)]
@@ -19,6 +20,9 @@ pub struct CheckArguments {
     /// Rig file whose column names, units and parts the recordings are held against
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
+    /// Print JSON: one array, one object a recording, with what is wrong under `findings`
+    #[arg(long)]
+    json: bool,
 }
 
 impl CheckArguments {
@@ -30,6 +34,12 @@ impl CheckArguments {
         if let [only] = &self.recordings[..]
             && LoadedStudy::is_named_by(only)
         {
+            if self.json {
+                return Err(Failure::bad_input(format!(
+                    "{}: --json is for recordings; name those of the study",
+                    only.display()
+                )));
+            }
             let LoadedStudy { study, .. } = load_study(&self.recordings, self.rig.as_deref(), &[])?;
             print(&describe_study(only, &study)?)?;
             return Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)));
@@ -42,6 +52,7 @@ impl CheckArguments {
             let _ = writeln!(text, "{}: rig `{}`, {effects}", path.display(), rig.name);
         }
         let mut outcome = Outcome::done();
+        let mut all = Vec::new();
         for path in &self.recordings {
             let recording = match &rig {
                 Some(rig) => rig.load_recording(path)?,
@@ -61,8 +72,19 @@ impl CheckArguments {
                 );
             }
             outcome.extend(outcome_of([&recording]).notes());
+            let facts = Facts::of(&recording, path);
+            if !facts.still.is_empty() {
+                let still = facts.still.join(", ");
+                let _ = writeln!(text, "  the same value in every row: {still}; at rest, or a sensor hangs");
+            }
+            outcome.extend(facts.findings.iter().filter(|finding| !recording.notes().contains(finding)));
+            all.push(facts);
         }
-        print(&text)?;
+        if self.json {
+            print_json(&all)?;
+        } else {
+            print(&text)?;
+        }
         Ok(outcome)
     }
 }

@@ -11,9 +11,9 @@ use super::outcome_of;
 /// Arguments of `bowden convert`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ConvertArguments {
-    /// Recording to read (.csv, .csv.gz, .mcap)
+    /// Recording to read (.csv, .csv.gz, .mcap, .parquet)
     input: PathBuf,
-    /// File to write; its name's ending gives the format: .csv, .csv.gz or .mcap
+    /// File to write; its name's ending gives the format: .csv, .csv.gz, .mcap or .parquet
     output: PathBuf,
 }
 

@@ -35,7 +35,7 @@ impl FaultsArguments {
     /// Exit status 2, if the output or the port is not usable; 1, if the board refused or the link broke.
     pub fn run(&self) -> Result<Outcome, Failure> {
         if let Some(path) = &self.snapshot {
-            Format::for_output(path)?;
+            Format::for_rows(path)?;
             output::check_file(path, &[])?;
         }
         let mut client = self.port.connect()?;
@@ -93,7 +93,7 @@ pub(super) fn describe(status: &Status) -> String {
 
 /// Writes what the board kept of the last ticks; returns what is missing of them.
 fn save_snapshot(client: &mut Client, status: &Status, path: &Path) -> Result<Option<String>, Failure> {
-    let format = Format::for_output(path)?;
+    let format = Format::for_rows(path)?;
     let parameters = ParameterSet::read(client)?;
     let conversion = Conversion::new(&parameters)?;
     let mut samples: Vec<(u32, Sample)> = Vec::with_capacity(status.snapshot.into());

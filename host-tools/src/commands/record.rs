@@ -64,7 +64,7 @@ impl RecordArguments {
     /// Exit status 2, if an output or the port is not usable or the joint cannot do the reference; 1, if the board refused, a fault stopped the joint, or the
     /// link broke. What was recorded until then is kept.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
-        let format = Format::for_output(&self.out)?;
+        let format = Format::for_rows(&self.out)?;
         let inputs: Vec<&Path> = self.course.file().into_iter().chain(self.parameters.as_deref()).collect();
         output::check_file(&self.out, &inputs)?;
         let mut others = vec![self.out.clone()];

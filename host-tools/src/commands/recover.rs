@@ -26,7 +26,7 @@ impl RecoverArguments {
     /// # Errors
     /// Exit status 2, if the input holds no whole row or the output is not usable; 1, if the medium refuses.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        Format::for_output(&self.out)?;
+        Format::for_rows(&self.out)?;
         output::check_file(&self.out, &[&self.input])?;
         let recovered = recover(&self.input, &self.out)?;
         let (first_s, last_s) = recovered.span_s.unwrap_or_default();

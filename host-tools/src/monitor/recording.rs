@@ -36,7 +36,7 @@ impl Progress {
 /// # Errors
 /// Exit status 2, if nothing can be written there.
 pub fn check(out: &Path, inputs: &[&Path]) -> Result<Format, Failure> {
-    let format = Format::for_output(out)?;
+    let format = Format::for_rows(out)?;
     output::check_file(out, inputs)?;
     if format != Format::Mcap {
         output::check_file(&sidecar(out), inputs)?;

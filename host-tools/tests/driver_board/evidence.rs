@@ -85,7 +85,7 @@ fn a_recording_says_when_with_what_and_by_whom_it_was_made() {
     }
     // Converting keeps it.
     let original = metadata(&place.join("a.mcap"));
-    for pair in ["a.mcap", "c.csv", "d.mcap", "e.csv.gz"].windows(2) {
+    for pair in ["a.mcap", "c.csv", "d.mcap", "p.parquet", "e.csv.gz", "q.parquet", "r.mcap"].windows(2) {
         assert_eq!(bowden(place, &["convert", pair[0], pair[1]]).0, 0);
         assert_eq!(metadata(&place.join(pair[1])), original, "{}", pair[1]);
     }

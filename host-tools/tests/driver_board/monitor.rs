@@ -204,7 +204,7 @@ fn without_a_terminal_or_an_output_it_does_not_begin() {
     let (status, _, stderr) = bowden(folder.path(), &["monitor", "--port", "sim", "--record", "a.txt"]);
     assert_eq!(
         (status, stderr.as_str()),
-        (2, "bowden: a.txt: unknown format; end the name in .csv, .csv.gz or .mcap\n")
+        (2, "bowden: a.txt: unknown format; end the name in .csv, .csv.gz, .mcap or .parquet\n")
     );
 }
 

@@ -78,7 +78,7 @@ fn what_cannot_be_done_is_told_before_the_port_is_opened() {
     };
     assert_refused(
         &record(&["--out", "a.txt"]),
-        "a.txt: unknown format; end the name in .csv, .csv.gz or .mcap",
+        "a.txt: unknown format; end the name in .csv, .csv.gz, .mcap or .parquet",
     );
     assert_refused(
         &record(&["--out", "a.csv", "--reference", "sinus"]),

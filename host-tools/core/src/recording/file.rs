@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::{
     Column, Format, Metadata, READ_BUFFER, ReadOptions, Recording, RowColumn, RowWriter, comma_separated,
-    mcap_file,
+    mcap_file, parquet_file,
 };
 use crate::outcome::Failure;
 use crate::output;
@@ -47,6 +47,9 @@ impl Recording {
         if start.starts_with(mcap::MAGIC) {
             return mcap_file::read(file, source, options);
         }
+        if start.starts_with(parquet_file::MAGIC) {
+            return parquet_file::read(path, source, options);
+        }
         let recording = if named_mcap {
             Err(Failure::bad_input(format!(
                 "{source}: byte 0: not the start of an MCAP file; if it is a table, call it .csv"
@@ -64,12 +67,15 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Writes the recording in the format that the file name asks for: `.csv`, `.csv.gz` or `.mcap`.
+    /// Writes the recording in the format that the file name asks for: `.csv`, `.csv.gz`, `.mcap` or `.parquet`.
     ///
     /// # Errors
     /// A name that asks for no known format (see [`Format::for_output`]), or the reason why the medium refuses.
     pub fn save(&self, path: &Path) -> Result<(), Failure> {
         let format = Format::for_output(path)?;
+        if format == Format::Parquet {
+            return output::write_file(path, |file| parquet_file::write(self, file));
+        }
         let columns: Vec<RowColumn> = self.columns.iter().map(|column| self.written(column)).collect();
         output::write_file(path, |file| {
             let mut writer = RowWriter::new(format, &columns, &self.metadata, file)?;

@@ -46,7 +46,7 @@ impl Metadata {
         let name = recording.file_name()?.to_string_lossy().into_owned();
         let lower = name.to_ascii_lowercase();
         let stem = match Format::of(recording) {
-            Some(Format::Mcap) => return None,
+            Some(Format::Mcap | Format::Parquet) => return None,
             Some(Format::Csv | Format::GzippedCsv) => {
                 let ending = [".csv.gz", ".csv"].into_iter().find(|ending| lower.ends_with(ending))?;
                 &name[..name.len() - ending.len()]

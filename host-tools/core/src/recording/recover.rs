@@ -41,7 +41,7 @@ const PLACES_SHOWN: usize = 20;
 /// # Errors
 /// Exit status 2, if the input cannot be read or holds no whole row; 1, if the medium of the output refuses.
 pub fn recover(path: &Path, out: &Path) -> Result<Recovered, Failure> {
-    let format = Format::for_output(out)?;
+    let format = Format::for_rows(out)?;
     let source = path.display().to_string();
     let unreadable = |error: &std::io::Error| {
         Failure::bad_input(format!("{source}: cannot be read: {}; check the path", output::describe(error)))

@@ -25,6 +25,8 @@ impl<W: Write + Seek> RowWriter<W> {
         Ok(Self(match format {
             Format::Csv => Form::Csv(comma_separated::Writer::new(names, out)?),
             Format::GzippedCsv => Form::GzippedCsv(comma_separated::Writer::new(names, Members::new(out))?),
+            // Refused by `Format::for_rows` before.
+            Format::Parquet => return Err(io::ErrorKind::Unsupported.into()),
             Format::Mcap => Form::Mcap(Box::new(mcap_file::Writer::new(columns, metadata, out)?)),
         }))
     }

@@ -78,7 +78,7 @@ impl Driver<'_> {
         self.session.ready(self.stop)?;
         self.session.home(self.stop)?;
         self.progress.stage(name, PROGRESS_STEPS);
-        let format = Format::for_output(&out)?;
+        let format = Format::for_rows(&out)?;
         let origin = Origin { reference: Some((*reference).to_owned()), ..self.origin.clone() };
         let capture = Capture {
             out: &out,
