@@ -68,13 +68,13 @@ mod tests {
         let text = chart("x", &t_s, &t_s);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), ROWS + 2);
-        // By hand: the first row of dots is full at the right end, the last one at the left.
+        // By hand: 32 dots high and 144 wide, the two dots at either end are at the height of the end.
         assert!(
-            lines[1].starts_with("    999.0000 \u{2800}") && lines[1].ends_with('\u{28b9}'),
+            lines[1].starts_with("    999.0000 \u{2800}") && lines[1].ends_with('\u{2809}'),
             "{}",
             lines[1]
         );
-        assert!(lines[ROWS].starts_with("      0.0000 \u{28c7}"), "{}", lines[ROWS]);
+        assert!(lines[ROWS].starts_with("      0.0000 \u{28c0}"), "{}", lines[ROWS]);
         assert_eq!(lines[1].chars().count(), 13 + COLUMNS);
     }
 

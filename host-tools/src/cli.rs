@@ -6,7 +6,7 @@ use std::panic::PanicHookInfo;
 
 use bowden_core::outcome::{ExitStatus, Failure, Outcome, one_line};
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     check::CheckArguments, convert::ConvertArguments, fit::FitArguments, replay::ReplayArguments,
@@ -62,6 +62,12 @@ enum Command {
     Params(crate::commands::params::ParamsArguments),
     /// Show the fault of a driver board, what led to it, and clear it
     Faults(crate::commands::faults::FaultsArguments),
+    /// Say whether this machine and the board are ready for work, and what to do where they are not
+    Doctor(crate::commands::doctor::DoctorArguments),
+    /// Print what completes this command line in a shell
+    Completions(crate::commands::shell::CompletionsArguments),
+    /// Print this program's manual page, or write those of all commands
+    Man(crate::commands::shell::ManArguments),
     /// Send a driver board from one state to another
     Send(crate::commands::send::SendArguments),
 }
@@ -109,6 +115,9 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),
         Command::Faults(arguments) => arguments.run(),
+        Command::Doctor(arguments) => arguments.run(),
+        Command::Completions(arguments) => arguments.run(Cli::command()),
+        Command::Man(arguments) => arguments.run(Cli::command()),
         Command::Send(arguments) => arguments.run(),
     }
 }
@@ -149,7 +158,6 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        use clap::CommandFactory;
         Cli::command().debug_assert();
     }
 }

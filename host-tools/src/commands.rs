@@ -4,6 +4,7 @@ pub mod check;
 pub mod convert;
 mod course;
 pub mod diagnose;
+pub mod doctor;
 pub mod effect;
 pub mod faults;
 pub mod fit;
@@ -17,6 +18,7 @@ pub mod record;
 pub mod recover;
 pub mod replay;
 pub mod send;
+pub mod shell;
 pub mod simulate;
 
 use std::io::Write;

@@ -7,5 +7,6 @@ pub mod cli;
 pub mod commands;
 pub mod facts;
 pub mod interrupt;
+mod machine;
 pub mod monitor;
 pub mod progress;

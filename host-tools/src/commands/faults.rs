@@ -10,10 +10,11 @@ use bowden_host_link::conversion::{Conversion, columns};
 use bowden_host_link::recorder::tick_time_s;
 use bowden_host_link::{Client, LinkError, ParameterSet};
 use bowden_link::message::{Boot, Goal, Refusal, Status};
-use bowden_link::{Limit, Sample};
+use bowden_link::{FaultRecord, Limit, Sample};
+use serde::Serialize;
 
 use super::port::PortArguments;
-use super::print;
+use super::{print, print_json};
 
 /// Arguments of `bowden faults`.
 #[derive(Clone, Debug, clap::Args)]
@@ -26,6 +27,48 @@ pub struct FaultsArguments {
     /// Write the last control ticks before the fault, or before now if there is none (.csv, .csv.gz, .mcap)
     #[arg(long, value_name = "OUT.csv")]
     snapshot: Option<PathBuf>,
+    /// Print JSON: one object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a board says of itself.
+#[derive(Serialize)]
+struct Facts<'f> {
+    state: String,
+    fault: Option<FaultFacts>,
+    limits: Vec<&'static str>,
+    tick: u32,
+    period_ns: u32,
+    longest_tick_cycles: u32,
+    samples_lost: u32,
+    unreadable_frames: u32,
+    firmware: &'f str,
+    firmware_revision: &'f str,
+    board: &'f str,
+    board_serial: &'f str,
+    started_by: &'static str,
+    clock: String,
+    panic: &'f str,
+    snapshot: u8,
+}
+
+/// A fault in numbers and words.
+#[derive(Serialize)]
+struct FaultFacts {
+    number: u8,
+    channel: u8,
+    tick: u32,
+    got: f32,
+    limit: f32,
+    words: String,
+}
+
+impl From<FaultRecord> for FaultFacts {
+    fn from(record: FaultRecord) -> Self {
+        let FaultRecord { fault, channel, tick, got, limit } = record;
+        Self { number: fault as u8, channel, tick, got, limit, words: record.to_string() }
+    }
 }
 
 impl FaultsArguments {
@@ -50,6 +93,8 @@ impl FaultsArguments {
         };
         let _ = writeln!(text, "firmware {} on {}, started by: {boot}", greeting.firmware, greeting.board);
         let _ = writeln!(text, "clock: {}", greeting.chip.clock);
+        let clock = greeting.chip.clock.to_string();
+        let greeting = greeting.clone();
         let panic = client.panic_text()?;
         if !panic.is_empty() {
             let _ = writeln!(text, "panic before that: {}", bowden_core::outcome::one_line(&panic));
@@ -63,21 +108,46 @@ impl FaultsArguments {
             client.enter(Goal::ClearFault)?;
             text += "fault cleared\n";
         }
+        if self.json {
+            print_json(&Facts {
+                state: status.state.to_string(),
+                fault: status.fault.map(FaultFacts::from),
+                limits: acting(&status),
+                tick: status.tick,
+                period_ns: status.period_ns,
+                longest_tick_cycles: status.longest_tick_cycles,
+                samples_lost: status.lost,
+                unreadable_frames: status.bad_frames,
+                firmware: &greeting.firmware,
+                firmware_revision: &greeting.revision,
+                board: &greeting.board,
+                board_serial: &greeting.serial,
+                started_by: boot,
+                clock,
+                panic: &panic,
+                snapshot: status.snapshot,
+            })?;
+            return Ok(outcome);
+        }
         print(&text)?;
         Ok(outcome)
     }
 }
 
+/// Limits that act, in words.
+fn acting(status: &Status) -> Vec<&'static str> {
+    Limit::ALL.into_iter().filter(|limit| status.limits.contains(*limit)).map(Limit::title).collect()
+}
+
 /// State, fault, limits and counters in lines.
 pub(super) fn describe(status: &Status) -> String {
-    let Status { state, fault, limits, tick, period_ns, longest_tick_cycles, lost, bad_frames, .. } = status;
+    let Status { state, fault, tick, period_ns, longest_tick_cycles, lost, bad_frames, .. } = status;
     let mut text = format!("state: {state}\n");
     let _ = match fault {
         Some(fault) => writeln!(text, "{fault}"),
         None => writeln!(text, "no fault"),
     };
-    let acting: Vec<&str> =
-        Limit::ALL.into_iter().filter(|limit| limits.contains(*limit)).map(Limit::title).collect();
+    let acting = acting(status);
     let acting = if acting.is_empty() { "none".to_owned() } else { acting.join(", ") };
     let _ = writeln!(text, "limits that act: {acting}");
     let _ = writeln!(

@@ -13,7 +13,7 @@ use bowden_host_link::{Client, ParameterSet};
 use table::TableArguments;
 
 use super::port::PortArguments;
-use super::print;
+use super::{print, print_json};
 
 /// Arguments of `bowden params`.
 #[derive(Clone, Debug, clap::Args)]
@@ -27,6 +27,9 @@ use super::print;
 pub struct ParamsArguments {
     #[command(flatten)]
     port: PortArguments,
+    /// Print JSON: `list` and `get` one array, one object a parameter
+    #[arg(long, global = true)]
+    json: bool,
     #[command(subcommand)]
     action: Option<Action>,
 }
@@ -111,6 +114,9 @@ impl ParamsArguments {
     /// # Errors
     /// Exit status 2, if a name, value, file or the port is not usable; 1, if the board refused or the link broke.
     pub fn run(&self) -> Result<Outcome, Failure> {
+        if self.json && !matches!(self.action, None | Some(Action::List | Action::Get { .. })) {
+            return Err(Failure::bad_input("--json: only `list` and `get` print facts; leave it out"));
+        }
         match &self.action {
             Some(Action::Save { file }) => output::check_file(file, &[])?,
             Some(Action::Table(table)) => table.check()?,
@@ -119,6 +125,8 @@ impl ParamsArguments {
         let mut client = self.port.connect()?;
         let parameters = ParameterSet::read(&mut client)?;
         match self.action.as_ref().unwrap_or(&Action::List) {
+            Action::List if self.json => print_json(&parameters.all())?,
+            Action::Get { name } if self.json => print_json(&[parameters.find(name)?])?,
             Action::List => print(&ParameterSet::table(parameters.all()))?,
             Action::Get { name } => print(&ParameterSet::table([parameters.find(name)?]))?,
             Action::Set { assignments } => {

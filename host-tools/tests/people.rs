@@ -1,0 +1,111 @@
+//! What makes the command usable: completions, manual pages, `doctor`, facts as JSON, no colours in a pipe.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use common::bowden;
+
+/// Subcommands, by what the help lists.
+fn subcommands() -> Vec<String> {
+    let (status, help, _) = bowden(Path::new("."), &["--help"]);
+    assert_eq!(status, 0);
+    let lines =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names: Vec<String> =
+        lines.filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect();
+    assert!(names.len() > 15, "{help}");
+    names.into_iter().filter(|name| name != "help").collect()
+}
+
+#[test]
+fn bash_itself_completes_every_subcommand() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, script, stderr) = bowden(folder.path(), &["completions", "bash"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    fs::write(folder.path().join("c.bash"), script).unwrap();
+    // As bash calls it after `bowden re` and a tab.
+    let ask = "source ./c.bash; COMP_WORDS=(bowden re); COMP_CWORD=1; _bowden bowden re bowden; echo ${COMPREPLY[@]}";
+    let output = Command::new("bash").current_dir(folder.path()).args(["-c", ask]).output().unwrap();
+    let offered = String::from_utf8(output.stdout).unwrap();
+    let mut offered: Vec<&str> = offered.split_whitespace().collect();
+    offered.sort_unstable();
+    let names = subcommands();
+    let mut expected: Vec<&str> =
+        names.iter().map(String::as_str).filter(|name| name.starts_with("re")).collect();
+    expected.sort_unstable();
+    assert_eq!(offered, expected);
+    for shell in ["zsh", "fish", "elvish", "powershell"] {
+        let (status, script, _) = bowden(folder.path(), &["completions", shell]);
+        assert!(status == 0 && names.iter().all(|name| script.contains(name.as_str())), "{shell}");
+    }
+    let (status, _, stderr) = bowden(folder.path(), &["completions", "tcsh"]);
+    assert_eq!((status, stderr.lines().count()), (2, 1), "{stderr}");
+}
+
+#[test]
+fn every_subcommand_has_a_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, _, stderr) = bowden(folder.path(), &["man", "--out", "man1"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    for name in subcommands() {
+        let page = fs::read_to_string(folder.path().join(format!("man1/bowden-{name}.1"))).unwrap();
+        assert!(page.contains(".SH NAME") && page.contains(".SH SYNOPSIS"), "{name}");
+    }
+    let (status, page, _) = bowden(folder.path(), &["man"]);
+    assert!(status == 0 && page.contains(".TH bowden 1") && page.contains("Exit status"), "{page}");
+}
+
+#[test]
+fn doctor_says_what_is_there_and_talks_to_a_board() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, stdout, stderr) = bowden(folder.path(), &["doctor", "--port", "sim", "--json"]);
+    let checks: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    let subjects: Vec<&str> =
+        checks.as_array().unwrap().iter().map(|check| check["subject"].as_str().unwrap()).collect();
+    assert_eq!(subjects, ["bowden", "compiler", "probe", "port", "board"]);
+    assert_eq!(
+        (&checks[4]["grade"], checks[4]["found"].as_str().unwrap().starts_with("simulated, firmware ")),
+        (&"ok".into(), true)
+    );
+    let wrong = stdout.contains("\"wrong\"");
+    assert_eq!(status, i32::from(wrong), "{stderr}");
+    let (status, stdout, stderr) = bowden(folder.path(), &["doctor", "--port", "/no/such/port"]);
+    assert_eq!((status, stderr.lines().count()), (1, 1), "{stderr}");
+    assert!(stdout.contains("WRONG  board: /no/such/port: "), "{stdout}");
+    assert!(stderr.contains("board; the lines above say what to do"), "{stderr}");
+}
+
+#[test]
+fn facts_of_a_board_come_as_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let (status, stdout, stderr) = bowden(folder.path(), arguments);
+        assert_eq!((status, stderr.as_str()), (0, ""), "{arguments:?}");
+        serde_json::from_str(&stdout).unwrap()
+    };
+    let parameters = json(&["params", "--port", "sim", "--json"]);
+    assert!(parameters.as_array().unwrap().len() > 90);
+    let one = json(&["params", "--port", "sim", "get", "supervisor.host_timeout", "--json"]);
+    assert_eq!((&one[0]["value"], &one[0]["unit"]), (&0.5.into(), &"s".into()));
+    let faults = json(&["faults", "--port", "sim", "--json"]);
+    assert_eq!(
+        (&faults["state"], &faults["fault"], &faults["board"]),
+        (&"off".into(), &serde_json::Value::Null, &"simulated".into())
+    );
+    let (status, _, stderr) = bowden(folder.path(), &["params", "--port", "sim", "store", "--json"]);
+    assert_eq!((status, stderr.lines().count()), (2, 1), "{stderr}");
+}
+
+#[test]
+fn nothing_is_coloured_in_a_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases: [&[&str]; 5] =
+        [&["--help"], &["record", "--help"], &["nonsense"], &["doctor"], &["params", "--port", "sim"]];
+    for arguments in cases {
+        let (_, stdout, stderr) = bowden(folder.path(), arguments);
+        assert!(!stdout.contains('\u{1b}') && !stderr.contains('\u{1b}'), "{arguments:?}");
+    }
+}
