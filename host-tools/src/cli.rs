@@ -103,12 +103,12 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
     match &cli.command {
         Command::Check(arguments) => arguments.run(),
         Command::Diagnose(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
-        Command::Convert(arguments) => arguments.run(),
+        Command::Convert(arguments) => under_way(cli, "converting", || arguments.run()),
         Command::Info(arguments) => arguments.run(),
         Command::Recover(arguments) => arguments.run(),
-        Command::Replay(arguments) => arguments.run(),
+        Command::Replay(arguments) => under_way(cli, "replaying", || arguments.run()),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
-        Command::Simulate(arguments) => arguments.run(),
+        Command::Simulate(arguments) => under_way(cli, "simulating", || arguments.run()),
         Command::Effect(arguments) => arguments.run(),
         Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Monitor(arguments) => arguments.run(),
@@ -120,6 +120,13 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Man(arguments) => arguments.run(Cli::command()),
         Command::Send(arguments) => arguments.run(),
     }
+}
+
+/// Shows that work without steps goes on; for commands that print nothing meanwhile.
+fn under_way<T>(cli: &Cli, stage: &str, work: impl FnOnce() -> T) -> T {
+    let progress = progress::for_stderr(cli.quiet);
+    progress.stage(stage, 0);
+    work()
 }
 
 /// One line on stderr; a closed stderr is no reason to stop.
