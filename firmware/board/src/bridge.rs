@@ -40,6 +40,9 @@ const DEAD_TIME: u8 = 60;
 /// gets dangerous in microseconds.
 const BREAK_FILTER: FilterValue = FilterValue::FDTS_DIV8_N8;
 
+/// Level of the voltage detector: 2.9 V where 3.3 V should be (RM0440, `PWR_CR2`).
+const SUPPLY_LEVEL: u8 = 6;
+
 /// The bridge, off after [`Self::new`].
 pub struct Bridge {
     enable: Output<'static>,
@@ -105,6 +108,11 @@ impl Bridge {
         status.bif(0) || status.sbif()
     }
 
+    /// Whether that was the processor's supply; to be asked only if there was a [`Self::fault`].
+    pub fn supply_is_low() -> bool {
+        pac::PWR.sr2().read().pvdo()
+    }
+
     /// Duty of the coming PWM period, gate driver awake or not, and bridge on or off; off acts at once.
     pub fn set(&mut self, duty_raw: i16, awake: bool, on: bool) {
         let offset = (HALF_PERIOD * i32::from(duty_raw)) >> 15;
@@ -144,6 +152,10 @@ fn connect_fault_line(fault: Peri<'static, PB12>) {
 
 /// What the processor itself finds breaks too: lockup, PVD, parity of the RAM, two wrong bits of the flash (RM0440, `SYSCFG_CFGR2`).
 fn break_by_system() {
+    pac::PWR.cr2().write(|detector| {
+        detector.set_pls(SUPPLY_LEVEL);
+        detector.set_pvde(true);
+    });
     pac::SYSCFG.cfgr2().modify(|breaks| {
         breaks.set_cll(true);
         breaks.set_spl(true);

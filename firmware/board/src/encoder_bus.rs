@@ -12,13 +12,16 @@ use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::bdma::vals::{Dir, Pl, Size};
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::spi::Spi as SpiRegisters;
-use embassy_stm32::pac::spi::vals::{Br, Cpha};
+use embassy_stm32::pac::spi::vals::{Br, Cpha, Cpol};
 use embassy_stm32::pac::{DMA1, DMAMUX1, GPIOA, GPIOD, SPI1, SPI3};
 use embassy_stm32::spi::Spi;
 use embassy_stm32::spi::mode::Master;
 
 /// Bytes of the longest frame.
 const LONGEST: usize = 3;
+
+/// Bytes of the SPI's receive FIFO, and one that an overrun leaves.
+const FIFO: usize = 5;
 
 /// What the encoders are sent: AMT22 takes zero for "read the angle", AS5045 has no input.
 static ZERO: AtomicU8 = AtomicU8::new(0);
@@ -88,13 +91,15 @@ impl EncoderBus {
     /// Sets clock and mode for `part`; between frames only.
     pub fn set_part(&self, part: Part) {
         // 170 MHz / 128 = 1.328 MHz where the AMT22 allows 2 MHz, / 256 = 0.664 MHz where the AS5045 allows 1 MHz.
-        let (phase, rate) = match part {
-            Part::Amt22 => (Cpha::FIRST_EDGE, Br::DIV128),
-            Part::As5045 => (Cpha::SECOND_EDGE, Br::DIV256),
+        // Both are read at the first edge; the clock of an AS5045 idles high, and its first falling edge latches.
+        let (idle, rate) = match part {
+            Part::Amt22 => (Cpol::IDLE_LOW, Br::DIV128),
+            Part::As5045 => (Cpol::IDLE_HIGH, Br::DIV256),
         };
         self.spi.cr1().modify(|control| control.set_spe(false));
         self.spi.cr1().modify(|control| {
-            control.set_cpha(phase);
+            control.set_cpol(idle);
+            control.set_cpha(Cpha::FIRST_EDGE);
             control.set_br(rate);
         });
         self.spi.cr1().modify(|control| control.set_spe(true));
@@ -133,10 +138,12 @@ impl EncoderBus {
         }
     }
 
-    /// The bytes that came, first one first; `None` if the exchange has not ended.
+    /// The bytes that came, first one first; `None` if the exchange has not ended, or not well.
     pub fn received(&self) -> Option<[u8; LONGEST]> {
-        let [receive, _] = self.channels;
-        if !DMA1.isr().read().tcif(receive) {
+        let [receive, send] = self.channels;
+        let (moved, status) = (DMA1.isr().read(), self.spi.sr().read());
+        let failed = moved.teif(receive) || moved.teif(send) || status.ovr() || status.rxne();
+        if !moved.tcif(receive) || failed {
             return None;
         }
         let mut bytes = [0; LONGEST];
@@ -144,5 +151,28 @@ impl EncoderBus {
             *byte = place.load(Ordering::Acquire);
         }
         Some(bytes)
+    }
+
+    /// Ends an exchange that went wrong, so that the next one begins with nothing of it: a byte left in the FIFO would shift all
+    /// frames after it, and DMA errors and overruns stay until they are cleared (RM0440, DMA and SPI).
+    pub fn recover(&self) {
+        for channel in self.channels {
+            DMA1.ch(channel).cr().modify(|control| control.set_en(false));
+            DMA1.ifcr().write(|flags| flags.set_gif(channel, true));
+        }
+        if self.spi.sr().read().bsy() {
+            // A byte is on the wires; the next round finds it in the FIFO.
+            return;
+        }
+        self.spi.cr1().modify(|control| control.set_spe(false));
+        for _ in 0..FIFO {
+            if !self.spi.sr().read().rxne() {
+                break;
+            }
+            self.spi.dr8().read();
+        }
+        // Reading data, then status, clears an overrun.
+        self.spi.sr().read();
+        self.spi.cr1().modify(|control| control.set_spe(true));
     }
 }

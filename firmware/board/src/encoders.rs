@@ -48,6 +48,9 @@ static PRESENT: [AtomicU8; 2] = [const { AtomicU8::new(u8::MAX) }; 2];
 /// Rounds of reading, for the watchdog; the low bits are the frames' sequence.
 static ROUNDS: AtomicU32 = AtomicU32::new(0);
 
+/// Exchanges that went wrong; written by the timer's interrupt.
+static RECOVERIES: AtomicU32 = AtomicU32::new(0);
+
 /// What the timer is waiting for.
 static STAGE: AtomicU8 = AtomicU8::new(IDLE);
 const IDLE: u8 = 0;
@@ -152,12 +155,17 @@ fn TIM7_DAC() {
     }
 }
 
-/// What came from an encoder: a byte, or the first 18 of 24 bits, which carry 12 of angle, 5 of status and the parity.
+/// What came from an encoder: a byte, or 18 of 24 bits behind a leading one: 12 of angle, 5 of status and the parity. An exchange
+/// that went wrong is cleared away and counted.
 fn collected(index: usize, bus: &EncoderBus) -> u32 {
     match (bus.received(), present(index)) {
-        (None, _) => ERROR,
+        (None, _) => {
+            bus.recover();
+            RECOVERIES.store(recoveries().wrapping_add(1), Ordering::Relaxed);
+            ERROR
+        }
         (Some([byte, ..]), Part::Amt22) => u32::from(byte),
-        (Some([a, b, c]), Part::As5045) => u32::from_be_bytes([0, a, b, c]) >> 6,
+        (Some([a, b, c]), Part::As5045) => u32::from_be_bytes([0, a, b, c]) >> 5 & 0x3_ffff,
     }
 }
 
@@ -171,6 +179,11 @@ pub fn words() -> [EncoderWord; 2] {
             bus_error: word & ERROR != 0,
         }
     })
+}
+
+/// Exchanges with an encoder that went wrong and were cleared away, since boot.
+pub fn recoveries() -> u32 {
+    RECOVERIES.load(Ordering::Relaxed)
 }
 
 /// Rounds of reading since boot.

@@ -109,6 +109,7 @@ impl Port for Reach {
             longest_tick_cycles: tick::longest_cycles(),
             lost: tick::lost(),
             snapshot: retained::memory().snapshot.len() as u8,
+            bus_errors: encoders::recoveries(),
         }
     }
 

@@ -69,10 +69,14 @@ struct Tick {
 struct Orders<'t> {
     ends: &'t mut TickEnds,
     late_permille: Option<u32>,
+    supply_low: bool,
 }
 
 impl Inbox for Orders<'_> {
     fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        if core::mem::take(&mut self.supply_low) {
+            return Some(act(&Command::Trip(Fault::ProcessorSupply, 0, 1.0, 0.0)));
+        }
         if let Some(permille) = self.late_permille.take() {
             let periods = permille as f32 * 1e-3;
             return Some(act(&Command::Trip(Fault::TickOverrun, 0, periods, 1.0)));
@@ -106,10 +110,12 @@ impl Tick {
         let Codes { tension_raw, current_raw, bus_raw } = self.analog.read();
         let encoder = encoders::words();
         encoders::ask();
-        let input =
-            TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault: self.bridge.fault() };
+        let bridge_fault = self.bridge.fault();
+        let supply_low = bridge_fault && Bridge::supply_is_low();
+        let input = TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault };
         let number = self.controller.tick_count();
-        let mut orders = Orders { ends: &mut self.ends, late_permille: self.late_permille.take() };
+        let late_permille = self.late_permille.take();
+        let mut orders = Orders { ends: &mut self.ends, late_permille, supply_low };
         let output = self.controller.tick(&input, &mut orders);
         self.bridge.set(output.duty_raw, output.driver_on, output.bridge_on);
         let ring = &retained::memory().snapshot;

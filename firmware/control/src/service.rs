@@ -45,6 +45,8 @@ pub struct View {
     pub lost: u32,
     /// Samples in the snapshot.
     pub snapshot: u8,
+    /// Exchanges with an encoder that failed, since boot.
+    pub bus_errors: u32,
 }
 
 /// Way to the control tick.
@@ -374,7 +376,8 @@ impl Service {
     }
 
     fn status(&self, port: &impl Port) -> Status {
-        let View { state, fault, limits, tick, longest_tick_cycles, lost, snapshot } = port.view();
+        let View { state, fault, limits, tick, longest_tick_cycles, lost, snapshot, bus_errors } =
+            port.view();
         Status {
             state,
             fault,
@@ -385,6 +388,7 @@ impl Service {
             lost,
             bad_frames: self.bad_frames,
             snapshot,
+            bus_errors,
         }
     }
 }

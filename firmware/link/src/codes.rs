@@ -133,6 +133,7 @@ faults! {
     36 RippleTableCorrupt "" "the stored ripple table cannot be read" "write the table anew or clear it, then store: bowden params table";
     37 ClockFailed "" "the crystal of the processor stopped" "check the crystal; until it runs again, times are good to 1 % only";
     38 FlashDamaged "" "a word of the flash is damaged" "flash the image again; if it comes back, replace the board";
+    39 ProcessorSupply "" "the supply of the processor fell below 2.9 V" "check the 3.3 V and 5 V supplies, and what shares them";
     40 SelfTestTimeout "s" "the self test did not end in time" "see which sensor is not steady at rest";
     41 PretensionOff "N" "tension at rest is not the pretension" "set the pretension, or correct the parameter tendon.pretension";
     42 HomingTimeout "s" "the joint did not reach angle zero in time" "look for a blocked joint or a wrong encoder direction";

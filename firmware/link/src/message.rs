@@ -363,6 +363,8 @@ pub struct Status {
     pub bad_frames: u32,
     /// Samples that the snapshot holds.
     pub snapshot: u8,
+    /// Exchanges with an encoder that DMA or SPI failed at, since boot; each costs a frame.
+    pub bus_errors: u32,
 }
 
 /// Why a request was not carried out.

@@ -9,7 +9,7 @@ use bowden_core::recording::{Format, Metadata, RowWriter};
 use bowden_host_link::conversion::{Conversion, columns};
 use bowden_host_link::recorder::tick_time_s;
 use bowden_host_link::{Client, LinkError, ParameterSet};
-use bowden_link::message::{Boot, Goal, Refusal, Status};
+use bowden_link::message::{Boot, Chip, Goal, Refusal, Status};
 use bowden_link::{FaultRecord, Limit, Sample};
 use serde::Serialize;
 
@@ -93,6 +93,13 @@ impl FaultsArguments {
         };
         let _ = writeln!(text, "firmware {} on {}, started by: {boot}", greeting.firmware, greeting.board);
         let _ = writeln!(text, "clock: {}", greeting.chip.clock);
+        let (level, expected) = (greeting.chip.brown_out_level, Chip::EXPECTED.brown_out_level);
+        if level != expected {
+            let _ = writeln!(
+                text,
+                "brown-out level {level}, expected {expected} (2.8 V): set the option bytes BOR_LEV"
+            );
+        }
         let clock = greeting.chip.clock.to_string();
         let greeting = greeting.clone();
         let panic = client.panic_text()?;
@@ -141,7 +148,8 @@ fn acting(status: &Status) -> Vec<&'static str> {
 
 /// State, fault, limits and counters in lines.
 pub(super) fn describe(status: &Status) -> String {
-    let Status { state, fault, tick, period_ns, longest_tick_cycles, lost, bad_frames, .. } = status;
+    let Status { state, fault, tick, period_ns, longest_tick_cycles, lost, bad_frames, bus_errors, .. } =
+        status;
     let mut text = format!("state: {state}\n");
     let _ = match fault {
         Some(fault) => writeln!(text, "{fault}"),
@@ -158,6 +166,7 @@ pub(super) fn describe(status: &Status) -> String {
     );
     let _ =
         writeln!(text, "samples lost on the board: {lost}, unreadable frames from the host: {bad_frames}");
+    let _ = writeln!(text, "failed exchanges with encoders: {bus_errors}");
     text
 }
 

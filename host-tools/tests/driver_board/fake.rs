@@ -415,6 +415,7 @@ impl Fake {
                     lost: 0,
                     bad_frames: 2,
                     snapshot: self.snapshot.len() as u8,
+                    bus_errors: 3,
                 }));
             }
             ToBoard::ReadSnapshot(index) => {

@@ -448,7 +448,11 @@ impl Board {
                 Injection::EncoderBus(at) => {
                     machine.bus.stalled_encoders[usize::from(at == EncoderAt::Joint)] = on;
                 }
+                Injection::EncoderDmaError(at) if on => {
+                    machine.bus.fail_encoder_dma(usize::from(at == EncoderAt::Joint));
+                }
                 Injection::FlashDamage if on => machine.bus.fetch_damaged(now),
+                Injection::ProcessorSupply => machine.bus.set_supply_low(on, now),
                 Injection::Crystal => machine.bus.set_crystal(!on, now),
                 Injection::HostSilent => machine.bus.host.silent = on,
                 Injection::HostNotReading => machine.bus.host.withheld = on,

@@ -51,6 +51,7 @@ const TIMERS: [(u32, Bank, u32, u32, usize, u32, &str); 9] = [
 ];
 
 /// Everything behind the address map.
+#[expect(clippy::struct_excessive_bools, reason = "independent marks of what a test does, no state machine")]
 #[derive(Debug)]
 pub(crate) struct Bus {
     /// Board time.
@@ -88,6 +89,9 @@ pub(crate) struct Bus {
     driver_wakes: u64,
     /// Encoders whose SPI asks DMA for nothing.
     pub stalled_encoders: [bool; 2],
+    failing_encoders: [bool; 2],
+    /// The processor's supply is below the levels of its voltage detector.
+    supply_low: bool,
     /// A reset that a peripheral asks for.
     pub reset_request: Option<ResetCause>,
     /// What ends the run.
@@ -129,6 +133,8 @@ impl Bus {
             driver_awake: false,
             driver_wakes: NEVER,
             stalled_encoders: [false; 2],
+            failing_encoders: [false; 2],
+            supply_low: false,
             reset_request: None,
             failure: None,
             accesses: 0,
@@ -368,6 +374,22 @@ impl Bus {
             .map(|channel| self.dma.beat(channel))
     }
 
+    /// A bus error at the next item that DMA takes from the SPI of encoder `index`.
+    pub(crate) fn fail_encoder_dma(&mut self, index: usize) {
+        self.failing_encoders[index] = true;
+    }
+
+    /// Takes the bus errors that are due; true if there was one.
+    pub(crate) fn take_dma_error(&mut self, channel: usize) -> bool {
+        let request = self.dmamux.request(channel);
+        let due = (0..2).find(|index| self.failing_encoders[*index] && request == REQUEST_SPI[*index][0]);
+        if let Some(index) = due {
+            self.failing_encoders[index] = false;
+            self.dma.fail(channel);
+        }
+        due.is_some()
+    }
+
     /// Counts an item as moved.
     pub(crate) fn dma_done(&mut self, channel: usize) {
         self.dma_beats += 1;
@@ -393,6 +415,15 @@ impl Bus {
     pub(crate) fn fetch_damaged(&mut self, now: u64) {
         self.flash.fetch_damaged();
         self.break_by_flash(now);
+    }
+
+    /// The processor's supply falls below the levels of its voltage detector, or is back.
+    pub(crate) fn set_supply_low(&mut self, low: bool, now: u64) {
+        self.supply_low = low;
+        if low && self.pwr.detects_supply() && self.syscfg.breaks_by_supply() {
+            self.tim1.system_break();
+            self.tim1_changed(now);
+        }
     }
 
     fn break_by_flash(&mut self, now: u64) {

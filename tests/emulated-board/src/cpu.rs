@@ -330,6 +330,9 @@ fn move_dma(uc: &mut Uc<'_>) -> bool {
     let mut moved = false;
     while let Some(beat) = uc.get_data().bus.dma_beat() {
         moved = true;
+        if uc.get_data_mut().bus.take_dma_error(beat.channel) {
+            continue;
+        }
         let value = if PERIPHERALS.contains(beat.from) {
             uc.get_data_mut().load(beat.from, beat.size)
         } else {

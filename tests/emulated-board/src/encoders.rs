@@ -27,8 +27,9 @@ const TIME_SLACK_S: f64 = 5.0e-9;
 pub enum EncoderPart {
     /// Same Sky AMT22, 12 bits: 16-bit frame with two check bits, SPI mode 0, at most 2 MHz.
     Amt22,
-    /// ams AS5045: 18-bit frame with status and even parity, clock idle low, data taken at the second edge, at most
-    /// 1 MHz.
+    /// ams AS5045: 18-bit frame with status and even parity, at most 1 MHz. The clock idles high; its first falling edge
+    /// latches, while the data line is high, and each rising edge shifts the next bit out (data sheet, synchronous serial
+    /// interface). The first bit that a master takes in is that high level, and it takes bits in at falling edges.
     As5045,
 }
 
@@ -144,7 +145,7 @@ impl Encoder {
         let count = self.fault.stuck_at.unwrap_or(count) % COUNTS_PER_TURN;
         self.shift = match self.mounting.part {
             EncoderPart::Amt22 => u32::from(amt22_frame(count)) << 16 | 0xffff,
-            EncoderPart::As5045 => as5045_frame(count, self.fault.magnet_lost) << 14 | 0x3fff,
+            EncoderPart::As5045 => 1 << 31 | as5045_frame(count, self.fault.magnet_lost) << 13 | 0x1fff,
         };
         if self.fault.bit_error > 0.0 {
             for bit in 0..32 {
@@ -156,7 +157,7 @@ impl Encoder {
         if self.fault.last_bit {
             self.shift ^= match self.mounting.part {
                 EncoderPart::Amt22 => 1 << 16,
-                EncoderPart::As5045 => 1 << 14,
+                EncoderPart::As5045 => 1 << 13,
             };
         }
         if self.fault.silent {
@@ -192,7 +193,7 @@ impl Encoder {
         let ones = 0xffff >> (16 - bits);
         let Some(selected_s) = self.selected_at_s else { return Ok(ones) };
         let clock_hz = f64::from(bits) / (end_s - start_s);
-        let (highest_hz, select_s, second_edge) = match self.mounting.part {
+        let (highest_hz, select_s, idle_high) = match self.mounting.part {
             EncoderPart::Amt22 => (AMT22_CLOCK_HZ, AMT22_SELECT_S, false),
             EncoderPart::As5045 => (AS5045_CLOCK_HZ, AS5045_SELECT_S, true),
         };
@@ -203,12 +204,13 @@ impl Encoder {
                 1e-6 * highest_hz
             ));
         }
-        if clock.idle_high || clock.second_edge != second_edge {
+        // Both parts are read at the first edge: a rising one of an AMT22, a falling one of an AS5045.
+        if clock.idle_high != idle_high || clock.second_edge {
             return Err(format!(
-                "clock mode CPOL {} CPHA {}, expected CPOL 0 CPHA {}",
+                "clock mode CPOL {} CPHA {}, expected CPOL {} CPHA 0",
                 u8::from(clock.idle_high),
                 u8::from(clock.second_edge),
-                u8::from(second_edge)
+                u8::from(idle_high)
             ));
         }
         match self.last_end_s {
@@ -277,18 +279,25 @@ mod tests {
     }
 
     #[test]
-    fn three_bytes_of_an_as5045_hold_its_frame_in_their_top_bits() {
+    fn three_bytes_of_an_as5045_hold_its_frame_behind_a_leading_one() {
         let mounting = EncoderMounting { part: EncoderPart::As5045, count_at_zero: 0x123, reversed: false };
         let mut encoder = Encoder::new("joint encoder", mounting, 1);
-        let mode1 = ClockMode { second_edge: true, ..MODE0 };
+        let mode2 = ClockMode { idle_high: true, ..MODE0 };
         encoder.select(0.0, 0.0);
         let bytes: Vec<u16> = (0..3)
             .map(|k| {
                 let start = 1e-6 + 13e-6 * f64::from(k);
-                encoder.exchange(8, start, start + 12e-6, mode1).expect("in time")
+                encoder.exchange(8, start, start + 12e-6, mode2).expect("in time")
             })
             .collect();
-        assert_eq!(bytes, [0b0001_0010, 0b0011_1000, 0b0111_1111]);
+        // 1, then 0001 0010 0011 10 0001 of the frame, then ones: the line idles high.
+        assert_eq!(bytes, [0b1000_1001, 0b0001_1100, 0b0011_1111]);
+        encoder.select(0.0, 0.0);
+        for wrong in
+            [MODE0, ClockMode { second_edge: true, ..MODE0 }, ClockMode { second_edge: true, ..mode2 }]
+        {
+            assert!(encoder.exchange(8, 1e-6, 13e-6, wrong).is_err(), "{wrong:?}");
+        }
     }
 
     #[test]

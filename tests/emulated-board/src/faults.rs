@@ -76,12 +76,16 @@ pub enum Injection {
     EncoderSilent(EncoderAt),
     /// The SPI of an encoder asks DMA for nothing: a transfer does not begin, or does not end.
     EncoderBus(EncoderAt),
+    /// DMA meets a bus error at the next byte from an encoder, once.
+    EncoderDmaError(EncoderAt),
     /// The magnet of an AS5045 is lost: its status bits say so.
     EncoderMagnetLost(EncoderAt),
     /// The bridge pulls its fault pin low.
     BridgeFault,
     /// The crystal at HSE stops, or does not start.
     Crystal,
+    /// The processor's supply falls below the levels of its voltage detector.
+    ProcessorSupply,
     /// The core fetches from a damaged word of the flash, once.
     FlashDamage,
     /// A cable loses pretension: what is left of it \[1\].

@@ -228,6 +228,8 @@ impl Rig {
             }
             Injection::EncoderBus(_)
             | Injection::BridgeFault
+            | Injection::EncoderDmaError(_)
+            | Injection::ProcessorSupply
             | Injection::Crystal
             | Injection::FlashDamage
             | Injection::HostSilent

@@ -224,6 +224,7 @@ impl SimBoard {
             longest_tick_cycles: 0,
             lost: 0,
             snapshot: self.snapshot.len() as u8,
+            bus_errors: 0,
         };
         let reach =
             Reach { queues: &mut self.queues, snapshot: &self.snapshot, view, divider: &mut self.divider };

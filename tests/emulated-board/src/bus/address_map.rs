@@ -117,7 +117,7 @@ impl Bus {
             Unit::Spi(index) => self.spi[index].read(offset, 4),
             Unit::Usb => self.usb.read(offset),
             Unit::PacketMemory => Err(Refusal::no_register(offset)),
-            Unit::Pwr => self.pwr.read(offset),
+            Unit::Pwr => self.pwr.read(offset, self.supply_low),
             Unit::Syscfg => self.syscfg.read(offset),
             Unit::Exti => self.exti.read(offset),
             Unit::Tim1 => self.tim1.read(offset, now),

@@ -100,6 +100,12 @@ impl Dma {
         }
     }
 
+    /// A bus error of `channel` (RM0440, DMA): TEIF, and the channel is off.
+    pub(crate) fn fail(&mut self, channel: usize) {
+        self.channels[channel].control &= !ENABLE;
+        self.flags[channel / CHANNELS] |= 9 << (4 * (channel % CHANNELS));
+    }
+
     /// Interrupt lines that are high.
     pub(crate) fn lines(&self) -> u128 {
         if self.flags == [0, 0] {

@@ -1,4 +1,6 @@
-//! Power control, as far as run mode goes: backup domain access, USB Type-C pull-downs, boost (RM0440, PWR).
+//! Power control, as far as run mode goes: backup domain access, USB Type-C pull-downs, boost, voltage detector (RM0440, PWR).
+//!
+//! The supply is fine or below every level of the detector; in between there is nothing.
 
 use crate::error::{Refusal, only};
 
@@ -6,6 +8,7 @@ use crate::error::{Refusal, only};
 #[derive(Debug, Clone)]
 pub(crate) struct Pwr {
     cr1: u32,
+    cr2: u32,
     cr3: u32,
     cr5: u32,
 }
@@ -13,7 +16,7 @@ pub(crate) struct Pwr {
 impl Pwr {
     /// State behind a reset: range 1, normal mode.
     pub(crate) fn new() -> Self {
-        Self { cr1: 0x200, cr3: 0x8000, cr5: 0x100 }
+        Self { cr1: 0x200, cr2: 0, cr3: 0x8000, cr5: 0x100 }
     }
 
     /// Whether range 1 is in boost mode (R1MODE clear).
@@ -21,12 +24,19 @@ impl Pwr {
         self.cr5 & 0x100 == 0
     }
 
-    /// Value of the register at `offset`.
-    pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
+    /// Whether the voltage detector is on (PVDE).
+    pub(crate) fn detects_supply(&self) -> bool {
+        self.cr2 & 1 != 0
+    }
+
+    /// Value of the register at `offset`; `supply_low` is what the voltage detector sees.
+    pub(crate) fn read(&self, offset: u32, supply_low: bool) -> Result<u32, Refusal> {
         Ok(match offset {
             0x00 => self.cr1,
             0x08 => self.cr3,
-            0x04 | 0x0c | 0x10 | 0x14 => 0,
+            0x04 => self.cr2,
+            0x14 => u32::from(supply_low && self.detects_supply()) << 11,
+            0x0c | 0x10 => 0,
             0x80 => self.cr5,
             _ => return Err(Refusal::no_register(offset)),
         })
@@ -41,6 +51,13 @@ impl Pwr {
                     return Err(Refusal::because("CR1: only voltage range 1 is modelled"));
                 }
                 self.cr1 = value;
+            }
+            0x04 => {
+                only("CR2", value, 0xf)?;
+                if value & 0xe == 0xe {
+                    return Err(Refusal::because("CR2: the detector's external input (PLS 7) is not wired"));
+                }
+                self.cr2 = value;
             }
             0x08 => {
                 // EIWUL, UCPD1_STDBY and UCPD1_DBDIS; the pull-downs touch PB4 and PB6 only without supply.

@@ -28,6 +28,11 @@ impl Syscfg {
         self.cfgr2 & 8 != 0
     }
 
+    /// Whether a supply below the level of the voltage detector breaks (PVDL).
+    pub(crate) fn breaks_by_supply(&self) -> bool {
+        self.cfgr2 & 4 != 0
+    }
+
     /// Value of the register at `offset`.
     pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
         Ok(match offset {

@@ -36,6 +36,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::Panic => "a_panic_stops_the_motor_and_leaves_its_words",
         Fault::HardFault => "a_processor_fault_stops_the_motor_and_says_where",
         Fault::ClockFailed => "a_crystal_that_stops_opens_the_bridge_at_once_and_is_a_named_fault",
+        Fault::ProcessorSupply => "a_supply_of_the_processor_that_falls_opens_the_bridge_in_hardware",
         Fault::FlashDamaged => "damaged_code_opens_the_bridge_and_is_a_named_fault",
         Fault::FlashBanks => "a_flash_of_one_bank_is_told_and_nothing_is_stored",
         Fault::RestartLoop => "three_restarts_without_a_host_end_in_safe_mode",

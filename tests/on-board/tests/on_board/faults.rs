@@ -212,3 +212,35 @@ fn homing_that_does_not_arrive_ends() -> Outcome {
     assert_eq!(record.fault, Fault::HomingTimeout, "{record}");
     Ok(())
 }
+
+/// The receiving channel is off behind the error, and the byte stays in the FIFO, where it would shift every frame behind it.
+#[test]
+fn an_error_of_the_encoders_dma_costs_a_frame_and_is_counted() -> Outcome {
+    let mut host = moving()?;
+    for errors in 1..=4 {
+        let at = if errors % 2 == 0 { EncoderAt::Input } else { EncoderAt::Joint };
+        host.board.inject(Injection::EncoderDmaError(at));
+        host.run(0.02)?;
+        let status = host.status()?;
+        assert_eq!((status.state, status.fault), (State::Run, None), "{at:?}");
+        assert!(!status.limits.contains(bowden_link::Limit::FrameRepaired), "{at:?}: over by now");
+        // An AMT22 has two exchanges a frame, and the second one may meet what the first one left.
+        assert!((errors..=2 * errors).contains(&status.bus_errors), "{status:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_supply_of_the_processor_that_falls_opens_the_bridge_in_hardware() -> Outcome {
+    let mut host = moving()?;
+    host.board.stall_core(true);
+    host.board.inject(Injection::ProcessorSupply);
+    host.board.run_for(1e-6)?;
+    let pwm = host.board.pwm();
+    assert_eq!((pwm.duty, pwm.driven), (None, [true, true]), "no instruction was needed");
+    host.board.stall_core(false);
+    let record = host.await_fault(0.1)?;
+    assert_eq!(record.fault, Fault::ProcessorSupply, "{record}");
+    host.board.clear_all();
+    checked(&mut host, record)
+}

@@ -61,6 +61,7 @@ fn the_joint_runs_at_twenty_kilohertz() -> Outcome {
     assert_eq!(host.telemetry.missing, u64::from(host.telemetry.lost));
     let arrived = host.telemetry.received - received;
     println!("{arrived} of {} samples", host.ticks.begun - begun);
-    assert!(arrived >= 19_900, "{arrived}, lost {:?}", host.telemetry.lost);
+    // Those of 10 ms at most are under way.
+    assert!(arrived >= 19_800, "{arrived}, lost {:?}", host.telemetry.lost);
     Ok(())
 }
