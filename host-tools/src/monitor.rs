@@ -5,7 +5,7 @@
 //! | [`signals`], [`history`], [`health`] | what is shown of samples and link |
 //! | [`panel`], [`view`] | how it is shown |
 //! | [`screen`], [`keys`] | the terminal |
-//! | [`recording`] | what is written meanwhile |
+//! | [`recording`], [`serving`] | what is written and served meanwhile |
 
 pub mod health;
 pub mod history;
@@ -13,5 +13,6 @@ pub mod keys;
 pub mod panel;
 pub mod recording;
 pub mod screen;
+pub mod serving;
 pub mod signals;
 pub mod view;

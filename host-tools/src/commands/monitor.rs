@@ -9,6 +9,7 @@ use bowden_core::output::describe;
 use bowden_core::recording::Format;
 use bowden_host_link::LinkError;
 use bowden_host_link::capture::Capture;
+use bowden_host_link::conversion::Conversion;
 use bowden_host_link::hub::{Hub, Next, Reader};
 use bowden_host_link::operator::{Desk, Plan, operate};
 use bowden_host_link::recorder::{Recorder, Tally};
@@ -20,6 +21,7 @@ use crate::interrupt;
 use crate::monitor::keys;
 use crate::monitor::recording::{self, Progress};
 use crate::monitor::screen::Screen;
+use crate::monitor::serving::Server;
 use crate::monitor::signals::Meter;
 use crate::monitor::view::{Beside, Watch};
 
@@ -51,6 +53,10 @@ pub struct MonitorArguments {
     /// Length of a run, s; otherwise until it is stopped
     #[arg(long, value_parser = run_seconds)]
     seconds: Option<f64>,
+    /// Serve the live data to Foxglove at ws://127.0.0.1:PORT, 8765 if not given; 0 for any that is free. Open
+    /// docs/foxglove-layout.json there
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "8765")]
+    foxglove: Option<u16>,
     /// Length of the history, s
     #[arg(long, value_name = "SECONDS", default_value = "20", value_parser = history_seconds)]
     history: f64,
@@ -89,11 +95,12 @@ impl MonitorArguments {
         let colours = !self.no_color && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let watch = Watch::new(meter, title, self.history, colours);
         let recorder = self.recorder(format, &plan, &session)?;
+        let server = self.server(meter, &plan, &session)?;
         let screen = Screen::open()?;
         let hub = Hub::default();
         let to_disk = recorder.as_ref().map(|_| hub.subscribe(RECORDING_ROOM));
         let recorder = recorder.zip(to_disk.as_ref());
-        let ended = attend(&mut session, &plan, &hub, watch, screen, recorder);
+        let ended = attend(&mut session, &plan, &hub, watch, screen, recorder, server);
         let not_recorded = to_disk.map_or(0, |reader| reader.lost());
         self.conclude(ended, not_recorded, &mut session)
     }
@@ -110,6 +117,12 @@ impl MonitorArguments {
         let capture =
             Capture { out, format, mode: plan.mode, every: 1, seconds: None, origin: &origin, rig: None };
         Ok(Some((capture.recorder(session)?, out.display().to_string())))
+    }
+
+    fn server(&self, meter: Meter, plan: &Plan, session: &Session) -> Result<Option<Server>, Failure> {
+        let Some(port) = self.foxglove else { return Ok(None) };
+        let conversion = Conversion::new(session.parameters())?;
+        Server::start(port, meter, conversion, plan.mode).map(Some)
     }
 
     /// What it amounts to.
@@ -154,16 +167,22 @@ fn attend(
     mut watch: Watch,
     screen: Screen,
     recorder: Option<((Recorder, String), &Reader)>,
+    server: Option<Server>,
 ) -> Ended {
     let (desk, progress) = (Desk::default(), Progress::default());
     let to_screen = hub.subscribe(SCREEN_ROOM);
+    let address = server.as_ref().map_or_else(String::new, Server::address);
     std::thread::scope(|threads| {
         let recorder = recorder.map(|((recorder, name), reader)| {
             let progress = &progress;
             threads.spawn(move || recording::write(recorder, &name, reader, progress))
         });
+        if let Some(server) = server {
+            let reader = hub.subscribe(SCREEN_ROOM);
+            threads.spawn(move || server.serve(&reader));
+        }
         let viewer = threads.spawn(|| {
-            let result = show(screen, &mut watch, &to_screen, &desk, &progress);
+            let result = show(screen, &mut watch, &to_screen, &desk, &progress, &address);
             // Nobody is left without a view of the joint.
             desk.quit();
             result
@@ -192,6 +211,7 @@ fn show(
     reader: &Reader,
     desk: &Desk,
     progress: &Progress,
+    address: &str,
 ) -> io::Result<()> {
     loop {
         let begun = Instant::now();
@@ -203,7 +223,8 @@ fn show(
         if next == Next::Ended {
             return Ok(());
         }
-        let beside = Beside { recording: progress.words(), server: String::new(), not_shown: reader.lost() };
+        let beside =
+            Beside { recording: progress.words(), server: address.to_owned(), not_shown: reader.lost() };
         screen.draw(|frame| watch.draw(frame, &desk.situation(), &beside))?;
         std::thread::sleep(FRAME.saturating_sub(begun.elapsed()));
     }

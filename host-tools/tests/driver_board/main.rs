@@ -9,6 +9,7 @@ mod common;
 mod cuts;
 mod evidence;
 mod fake;
+mod foxglove;
 mod from_rig;
 mod mishaps;
 mod monitor;
