@@ -6,18 +6,19 @@ use std::path::{Path, PathBuf};
 
 use bowden_core::outcome::Failure;
 use bowden_core::output;
-use bowden_core::progress::Progress;
+use bowden_core::progress::{Progress, Quiet};
 use bowden_core::recording::{DurableFile, END_GROUP, Format, Metadata};
 use bowden_link::message::Mode;
 
 use super::conversion::Conversion;
 use super::course::Course;
-use super::error::LinkError;
+use super::error::{CommsError, LinkError};
 use super::evidence::{self, Origin};
 use super::parameters::ParameterSet;
-use super::recorder::{Form, Recorder, Tally};
+use super::recorder::{Form, Recorder, Tally, tick_time_s};
+use super::replug::Replug;
 use super::rig_file::{self, Weight};
-use super::session::{RunEnd, Session, Stop};
+use super::session::{RunEnd, RunTick, Session, Stop};
 
 /// Name under which an MCAP file keeps firmware version and parameters.
 const METADATA: &str = "bowden.parameters";
@@ -42,7 +43,12 @@ pub struct Capture<'c> {
     pub origin: &'c Origin,
     /// Name and load of the joint, where a rig file is made from the board's parameters.
     pub rig: Option<(&'c str, Option<Weight>)>,
+    /// How a board that was unplugged is found again; otherwise a broken link is the end.
+    pub replug: Option<&'c Replug>,
 }
+
+/// Group of metadata that marks where the board was unplugged.
+pub const UNPLUGGED: &str = "bowden.unplugged";
 
 impl Capture<'_> {
     /// Opens the file, for ticks of this board.
@@ -73,6 +79,32 @@ impl Capture<'_> {
         Ok(Recorder::new(file, form, self.out))
     }
 
+    /// Takes ticks until the recording is long enough or the medium refuses.
+    fn sink<'s>(
+        &self,
+        recorder: &'s mut Recorder,
+        shown: &'s mut u64,
+        progress: &'s dyn Progress,
+    ) -> impl FnMut(&RunTick) -> ControlFlow<()> + 's {
+        let seconds = self.seconds;
+        move |tick| {
+            if !recorder.tick(tick) {
+                return ControlFlow::Break(());
+            }
+            let Some(seconds) = seconds else { return ControlFlow::Continue(()) };
+            let share = recorder.tally().duration_s() / seconds;
+            let step = ((share * PROGRESS_STEPS as f64) as u64).min(PROGRESS_STEPS);
+            progress.advance(step - *shown);
+            *shown = step;
+            // Half a nanosecond is below every control period.
+            if recorder.tally().duration_s() >= seconds - 5e-10 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        }
+    }
+
     /// From ready: runs along the course and writes the recording. It is kept whatever ended the run, unless it is empty.
     ///
     /// # Errors
@@ -86,22 +118,28 @@ impl Capture<'_> {
     ) -> Result<(Tally, Result<RunEnd, LinkError>), Failure> {
         let mut recorder = self.recorder(session)?;
         let mut shown = 0;
-        let end = session.run(self.mode, course, stop, &mut |tick| {
-            if !recorder.tick(tick) {
-                return ControlFlow::Break(());
+        let mut end = {
+            let mut sink = self.sink(&mut recorder, &mut shown, progress);
+            session.run(self.mode, course, stop, &mut sink)
+        };
+        let mut gaps = Vec::new();
+        while let (Some(replug), Err(LinkError::Comms(CommsError::Broken { .. })), Some((_, last))) =
+            (self.replug.filter(|replug| replug.is_on()), &end, recorder.tally().ticks)
+        {
+            progress.stage("unplugged; waiting for the board", 0);
+            match replug.bring_back(session, stop) {
+                Ok(_) => {}
+                // The broken link is what there is to say.
+                Err(LinkError::Interrupted | LinkError::Comms(_)) => break,
+                Err(other) => {
+                    end = Err(other);
+                    break;
+                }
             }
-            let Some(seconds) = self.seconds else { return ControlFlow::Continue(()) };
-            let share = recorder.tally().duration_s() / seconds;
-            let step = ((share * PROGRESS_STEPS as f64) as u64).min(PROGRESS_STEPS);
-            progress.advance(step - shown);
-            shown = step;
-            // Half a nanosecond is below every control period.
-            if recorder.tally().duration_s() >= seconds - 5e-10 {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        });
+            progress.stage("recording the stopped joint", 0);
+            end = session.observe(stop, &mut self.sink(&mut recorder, &mut shown, &Quiet));
+            gaps.push(last);
+        }
         let how = match &end {
             Ok(RunEnd::Complete) => "complete".to_owned(),
             Ok(RunEnd::Interrupted) => "stopped by the user".to_owned(),
@@ -115,7 +153,16 @@ impl Capture<'_> {
             let text = rig_file::text(name, session.parameters(), bus_v, load)?;
             known.extend(END_GROUP, [("rig".to_owned(), text)]);
         }
-        let tally = recorder.finish(&known)?;
+        if !gaps.is_empty() {
+            let period_ns = recorder.tally().period_ns;
+            let mark = |(number, last): (usize, &u64)| {
+                (format!("after_t_s.{number}"), format!("{:?}", tick_time_s(*last, period_ns)))
+            };
+            known.extend(UNPLUGGED, (1..).zip(&gaps).map(mark));
+        }
+        let mut tally = recorder.finish(&known)?;
+        tally.unplugged = gaps.len();
+        tally.first_unplugged = gaps.first().copied();
         // Without a row there is nothing to keep, and what ended the run counts.
         match end {
             end if tally.rows > 0 => Ok((tally, end)),

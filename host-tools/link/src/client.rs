@@ -23,7 +23,7 @@ use bowden_link::{Answer, Batch, FromBoard, PROTOCOL_VERSION, Request, SCHEMA, S
 use super::error::{CommsError, LinkError};
 use super::hub::{Hub, Live};
 use super::losses::{Losses, Place};
-use super::transport::Transport;
+use super::transport::{Gone, Transport};
 
 /// How often a request is sent before the board counts as silent, unless [`Client::hurry`] says more often.
 const ATTEMPTS: u32 = 10;
@@ -67,6 +67,8 @@ struct Wire {
     listening: bool,
     /// Where telemetry is published as well.
     hub: Option<Hub>,
+    /// Added to the board's count of ticks, after a start of the board that the host counts through.
+    tick_offset: u64,
     losses: Losses,
     restarted: Option<(u32, u32)>,
 }
@@ -90,6 +92,7 @@ impl Client {
             telemetry: VecDeque::new(),
             listening: false,
             hub: None,
+            tick_offset: 0,
             losses: Losses::default(),
             restarted: None,
         };
@@ -172,6 +175,36 @@ impl Client {
     /// Answers that came since the greeting.
     pub fn answers(&self) -> u64 {
         self.wire.answers
+    }
+
+    /// Gives a port that is broken back to the system.
+    pub fn hang_up(&mut self) {
+        self.transport = Box::new(Gone(self.transport.now()));
+    }
+
+    /// Goes on where another connection to the same board broke off, `away` before: its hub, its counts of ticks and of
+    /// losses. Returns whether the board started again meanwhile; its ticks then go on as if they had been counted on.
+    ///
+    /// # Errors
+    /// No answer.
+    pub fn continue_from(&mut self, before: &Self, away: Duration) -> Result<bool, LinkError> {
+        let status = self.status()?;
+        let period_ns = u64::from(status.period_ns.max(1));
+        let expected = before.wire.losses.next_tick();
+        let went_back =
+            expected.is_some_and(|expected| status.tick.wrapping_sub(expected as u32) > u32::MAX / 2);
+        // A board that is younger than the gap was not there before it.
+        let restarted = went_back || Duration::from_nanos(u64::from(status.tick) * period_ns) <= away;
+        self.wire.hub.clone_from(&before.wire.hub);
+        self.wire.heard_bytes += before.wire.heard_bytes;
+        self.wire.losses = before.wire.losses.carried(restarted);
+        self.wire.tick_offset = before.wire.tick_offset;
+        if restarted {
+            let gap = away.as_nanos() as u64 / period_ns;
+            let since_start = gap.saturating_sub(status.tick.into());
+            self.wire.tick_offset += expected.unwrap_or(0) + since_start;
+        }
+        Ok(restarted)
     }
 
     /// From now on hands telemetry to the readers of a hub as well.
@@ -513,7 +546,9 @@ impl Wire {
             match frame.message {
                 FromBoard::Telemetry(_) if !self.listening => {}
                 FromBoard::Telemetry(batch) => match self.losses.batch(&batch) {
-                    Place::At(first_tick) => self.keep(Telemetry { first_tick, batch }),
+                    Place::At(first_tick) => {
+                        self.keep(Telemetry { first_tick: first_tick + self.tick_offset, batch });
+                    }
                     Place::Late => {}
                     Place::Restarted { expected } => {
                         self.restarted = Some((batch.first_tick, expected.wrapping_sub(1)));

@@ -155,6 +155,11 @@ pub enum LinkError {
     /// Ctrl-C.
     #[error("stopped by the user")]
     Interrupted,
+    /// The board that came back is another one, or has other parameters.
+    #[error(
+        "the board came back changed: {0}; keep parameters with `bowden params store` before a run, and record again"
+    )]
+    Changed(String),
     /// A parameter that this program needs is not there.
     #[error("the board has no parameter `{0}`; flash the firmware that belongs to this bowden")]
     NoParameter(String),

@@ -8,9 +8,11 @@
 //! | [`parameters`] | the board's parameters by name, to and from a file |
 //! | [`from_rig`] | the board's parameters from what a fit or a diagnosis found |
 //! | [`ripple_table`] | the board's ripple table, to and from a file |
+//! | [`holders`] | who has a port open |
 //! | [`hub`] | live samples for several readers |
 //! | [`session`] | from off to a running reference and back to off |
 //! | [`operator`] | a joint with somebody at the keys |
+//! | [`replug`] | a board that was unplugged and comes back |
 //! | [`course`] | what the joint is to follow |
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
@@ -25,6 +27,7 @@ pub mod course;
 pub mod error;
 pub mod evidence;
 pub mod from_rig;
+pub mod holders;
 pub mod hub;
 pub mod investigate;
 pub mod losses;
@@ -32,6 +35,7 @@ pub mod operator;
 pub mod paced;
 pub mod parameters;
 pub mod recorder;
+pub mod replug;
 pub mod rig_file;
 pub mod ripple_table;
 pub mod serial;
@@ -63,10 +67,13 @@ pub const SIM: &str = "sim";
 /// Beginning of the name of a simulated board whose joint conceals something.
 const SIM_CONCEALS: &str = "sim:";
 
+/// Beginning of a name that chooses a board by its serial number.
+pub const SERIAL: &str = "serial:";
+
 /// Name that stands for the one board on USB.
 pub const AUTO: &str = "auto";
 
-/// Opens a port and greets the board: a serial port, [`AUTO`], or [`SIM`] with what the simulated joint conceals behind a colon.
+/// Opens a port and greets the board: a serial port, [`AUTO`], a serial number behind [`SERIAL`], or [`SIM`] with what the simulated joint conceals behind a colon.
 /// An answer of the board is waited for as long as `timeout`. A simulated board runs as fast as it can.
 ///
 /// # Errors
@@ -99,12 +106,10 @@ fn simulated(port: &str) -> Result<Option<sim::SimTransport>, LinkError> {
 }
 
 fn connect_serial(port: &str, timeout: Duration) -> Result<Client, LinkError> {
-    let (transport, name): (Box<dyn Transport>, String) = match port {
-        AUTO => {
-            let path = serial::find()?;
-            (Box::new(serial::SerialTransport::open(&path)?), path)
-        }
-        path => (Box::new(serial::SerialTransport::open(path)?), path.to_owned()),
+    let path = match (port, port.strip_prefix(SERIAL)) {
+        (AUTO, _) => serial::find(None)?,
+        (_, Some(number)) => serial::find(Some(number))?,
+        (path, None) => path.to_owned(),
     };
-    Client::connect(transport, name, timeout)
+    Client::connect(Box::new(serial::SerialTransport::open(&path)?), path, timeout)
 }

@@ -94,6 +94,19 @@ impl Losses {
         Place::At(at)
     }
 
+    /// Counts so far, for a new connection to the same board: frames are numbered anew. So are ticks of a board that
+    /// `restarted`. What comes first leaves a gap that is no loss of the link.
+    #[must_use]
+    pub fn carried(&self, restarted: bool) -> Self {
+        let clock = self.clock.filter(|_| !restarted);
+        Self { last_frame: None, clock, paused: true, ..*self }
+    }
+
+    /// Tick that is expected next, counted without wrapping; none before the first batch.
+    pub fn next_tick(&self) -> Option<u64> {
+        self.clock.map(|clock| clock.next)
+    }
+
     /// Telemetry rests: up to the next batch nothing counts as lost. The count of ticks goes on without wrapping.
     pub fn pause(&mut self) {
         self.paused = true;

@@ -13,8 +13,9 @@ use bowden_link::message::{Goal, Mode};
 use bowden_link::{FaultRecord, State};
 
 use super::course::Course;
-use super::error::LinkError;
+use super::error::{CommsError, LinkError};
 use super::recorder::tick_time_s;
+use super::replug::Replug;
 use super::session::{RunEnd, Session};
 
 /// Longest wait for telemetry before orders are looked at.
@@ -107,6 +108,42 @@ impl Desk {
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // Whoever panicked with it in hand left a whole value: each change is one assignment.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Serves the desk until somebody quits, through every absence of the board that `replug` waits for: the joint is stopped and
+/// not armed afterwards.
+///
+/// # Errors
+/// As [`operate`], where the board does not come back.
+pub fn operate_through(
+    session: &mut Session,
+    desk: &Desk,
+    plan: &Plan,
+    replug: &Replug,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<(), LinkError> {
+    loop {
+        let error = match operate(session, desk, plan, interrupted) {
+            Err(error @ LinkError::Comms(CommsError::Broken { .. })) if replug.is_on() => error,
+            result => return result,
+        };
+        desk.change(|situation| {
+            situation.armed = false;
+            situation.doing = None;
+            "unplugged: waiting for the board; q quits".clone_into(&mut situation.notice);
+        });
+        match replug.bring_back(session, &|| desk.is_over() || interrupted()) {
+            Ok(absence) => desk.change(|situation| {
+                let how = if absence.restarted { ", started again" } else { "" };
+                situation.notice = format!(
+                    "the board is back after {:.1} s{how}; the joint is stopped",
+                    absence.away.as_secs_f64()
+                );
+            }),
+            Err(LinkError::Interrupted | LinkError::Comms(_)) => return Err(error),
+            Err(other) => return Err(other),
+        }
+    }
 }
 
 /// Serves the desk until somebody quits, or `interrupted` says so; the bridge is off then.

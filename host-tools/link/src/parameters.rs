@@ -59,6 +59,17 @@ impl ParameterSet {
         format!("{}, firmware {}", self.board, self.firmware)
     }
 
+    /// First difference to the same board later, in words.
+    pub fn difference(&self, later: &Self) -> Option<String> {
+        let (before, after) = (self.board(), later.board());
+        if before != after {
+            return Some(format!("{after} in place of {before}"));
+        }
+        let mut pairs = self.parameters.iter().zip(&later.parameters);
+        let (before, after) = pairs.find(|(before, after)| before != after)?;
+        Some(format!("{} is {:?}, was {:?}", after.name, after.value, before.value))
+    }
+
     /// All parameters in the board's order.
     pub fn all(&self) -> &[Parameter] {
         &self.parameters

@@ -78,6 +78,10 @@ pub struct Tally {
     pub first_missing: Option<u64>,
     /// Voltage of the bus in the first sample, V.
     pub bus_v: Option<f64>,
+    /// How often the board was unplugged and came back.
+    pub unplugged: usize,
+    /// Last tick before the first time.
+    pub first_unplugged: Option<u64>,
 }
 
 /// Time of a tick, s: the nearest number to the exact product.
@@ -201,6 +205,19 @@ impl Tally {
     /// Time from the first sample to the end of the last one, s.
     pub fn duration_s(&self) -> f64 {
         self.ticks.map_or(0.0, |(first, last)| tick_time_s(last + 1 - first, self.period_ns))
+    }
+
+    /// One line about absences of the board, `None` if it was always there.
+    pub fn absences(&self) -> Option<String> {
+        let first = self.first_unplugged?;
+        let often = match self.unplugged {
+            1 => "once".to_owned(),
+            often => format!("{often} times"),
+        };
+        Some(format!(
+            "the board was unplugged {often}, first after t_s = {:?}; the joint was stopped and is at rest behind the gap",
+            tick_time_s(first, self.period_ns)
+        ))
     }
 
     /// One line about what is missing, `None` if nothing is. `losses` are those of the link during the recording.

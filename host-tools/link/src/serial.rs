@@ -10,16 +10,23 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use serialport::{ErrorKind, SerialPort, SerialPortType};
+use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
 
 use super::error::CommsError;
+use super::holders::{Holder, holders};
 use super::transport::Transport;
+use super::{AUTO, SERIAL};
 
 /// USB vendor of the board: pid.codes, free for open hardware.
 pub const USB_VENDOR: u16 = 0x1209;
 
 /// USB product of the board.
 pub const USB_PRODUCT: u16 = 0xb0d7;
+
+/// What lets a user open the port for good: a rule for the user at the machine and for the group that owns serial ports.
+const GRANT: &str = "grant it with echo 'SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"b0d7\", \
+                     GROUP=\"dialout\", MODE=\"0660\", TAG+=\"uaccess\"' | sudo tee -a /etc/udev/rules.d/70-bowden.rules \
+                     && sudo udevadm control --reload, then plug the board in again";
 
 /// Rate that the port is set to, baud. USB takes no notice of it.
 const BAUD: u32 = 115_200;
@@ -131,51 +138,169 @@ impl Drop for SerialTransport {
 fn open_error(path: &str, error: &serialport::Error) -> CommsError {
     let (reason, next) = match error.kind() {
         ErrorKind::Io(io::ErrorKind::NotFound) => {
-            ("there is no such port", "check the cable, or use --port auto")
+            ("there is no such port".to_owned(), "check the cable, or use --port auto")
         }
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => (
-            "this user may not open the port",
-            "add the user to the group that owns it (often dialout) and log in again",
-        ),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
+            ("this user may not open the port".to_owned(), GRANT)
+        }
         ErrorKind::NoDevice if Path::new(path).exists() => {
-            ("another program has the port open", "close that one first")
+            (held(&holders(Path::new(path))), "close that one first")
         }
         _ if std::fs::metadata(path).is_ok_and(|there| there.is_file() || there.is_dir()) => {
-            ("this is no serial port", "name one such as /dev/ttyACM0, or auto, or sim")
+            ("this is no serial port".to_owned(), "name one such as /dev/ttyACM0, or auto, or sim")
         }
-        _ => {
-            let reason = format!("cannot be opened as a serial port: {}", error.description.to_lowercase());
-            let next = "name one such as /dev/ttyACM0, or auto, or sim";
-            return CommsError::Open { port: path.to_owned(), reason, next };
-        }
+        _ => (
+            format!("cannot be opened as a serial port: {}", error.description.to_lowercase()),
+            "name one such as /dev/ttyACM0, or auto, or sim",
+        ),
     };
-    CommsError::Open { port: path.to_owned(), reason: reason.to_owned(), next }
+    CommsError::Open { port: path.to_owned(), reason, next }
 }
 
-/// Finds the one board on USB.
+/// Who has a port open, in words. Programs of other users cannot be named.
+fn held(holders: &[Holder]) -> String {
+    if holders.is_empty() {
+        return "another program has the port open".to_owned();
+    }
+    let named: Vec<String> =
+        holders.iter().map(|holder| format!("`{}` (process {})", holder.command, holder.pid)).collect();
+    let verb = if named.len() == 1 { "has" } else { "have" };
+    format!("{} {verb} the port open", named.join(", "))
+}
+
+/// Finds the one board on USB, or the one with a serial number.
 ///
 /// # Errors
 /// [`CommsError::Open`] when there is none, or more than one.
-pub fn find() -> Result<String, CommsError> {
-    let refuse = |reason: String, next| CommsError::Open { port: "auto".to_owned(), reason, next };
+pub fn find(number: Option<&str>) -> Result<String, CommsError> {
+    let ports = ports().map_err(|error| {
+        refuse_to_find(number, format!("ports cannot be listed: {error}"), "name the port")
+    })?;
+    choose(&ports, number)
+}
+
+/// Serial number of the board at a port, if the system knows one.
+pub fn number_of(path: &str) -> Option<String> {
+    let path = Path::new(path).canonicalize().ok()?;
+    let at_path =
+        |port: &SerialPortInfo| Path::new(&port.port_name).canonicalize().is_ok_and(|port| port == path);
+    let port = ports().ok()?.into_iter().find(at_path)?;
+    board(&port)?.serial_number.clone()
+}
+
+fn ports() -> serialport::Result<Vec<SerialPortInfo>> {
     // Without this folder the library has nothing to look through.
-    let ports = if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
-        Vec::new()
-    } else {
-        serialport::available_ports()
-            .map_err(|error| refuse(format!("ports cannot be listed: {error}"), "name the port"))?
+    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
+        return Ok(Vec::new());
+    }
+    serialport::available_ports()
+}
+
+/// The board at a port, if there is one.
+fn board(port: &SerialPortInfo) -> Option<&UsbPortInfo> {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) if (usb.vid, usb.pid) == (USB_VENDOR, USB_PRODUCT) => Some(usb),
+        _ => None,
+    }
+}
+
+fn refuse_to_find(number: Option<&str>, reason: String, next: &'static str) -> CommsError {
+    let port = number.map_or_else(|| AUTO.to_owned(), |number| format!("{SERIAL}{number}"));
+    CommsError::Open { port, reason, next }
+}
+
+fn choose(ports: &[SerialPortInfo], wanted: Option<&str>) -> Result<String, CommsError> {
+    let boards: Vec<(&str, Option<&str>)> = ports
+        .iter()
+        .filter_map(|port| Some((port.port_name.as_str(), board(port)?.serial_number.as_deref())))
+        .collect();
+    let named = |boards: &[(&str, Option<&str>)]| {
+        let name = |(port, number): &(&str, Option<&str>)| {
+            format!("{port} with serial number {}", number.unwrap_or("unknown"))
+        };
+        boards.iter().map(name).collect::<Vec<_>>().join(", ")
     };
-    let others: Vec<&str> = ports.iter().map(|port| port.port_name.as_str()).collect();
-    let is_board = |kind: &SerialPortType| matches!(kind, SerialPortType::UsbPort(usb) if (usb.vid, usb.pid) == (USB_VENDOR, USB_PRODUCT));
-    let boards: Vec<&str> =
-        ports.iter().filter(|port| is_board(&port.port_type)).map(|port| port.port_name.as_str()).collect();
-    match boards.as_slice() {
-        [board] => Ok((*board).to_owned()),
-        [] => {
+    let chosen: Vec<&(&str, Option<&str>)> =
+        boards.iter().filter(|(_, number)| wanted.is_none() || *number == wanted).collect();
+    match (chosen.as_slice(), boards.as_slice()) {
+        ([(port, _)], _) => Ok((*port).to_owned()),
+        ([], []) => {
+            let others: Vec<&str> = ports.iter().map(|port| port.port_name.as_str()).collect();
             let others = if others.is_empty() { "no port at all".to_owned() } else { others.join(", ") };
             let sought = format!("no USB device {USB_VENDOR:04x}:{USB_PRODUCT:04x} found ({others})");
-            Err(refuse(sought, "check the cable, or name the port"))
+            Err(refuse_to_find(wanted, sought, "check the cable, or name the port"))
         }
-        boards => Err(refuse(format!("{} boards found ({})", boards.len(), boards.join(", ")), "name one")),
+        ([], boards) => {
+            let reason = format!("no board has this serial number ({})", named(boards));
+            Err(refuse_to_find(wanted, reason, "correct it"))
+        }
+        (_, boards) => {
+            let reason = format!("{} boards found ({})", boards.len(), named(boards));
+            Err(refuse_to_find(wanted, reason, "choose one with --port serial:NUMBER"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn port(name: &str, kind: Option<(u16, Option<&str>)>) -> SerialPortInfo {
+        let port_type = kind.map_or(SerialPortType::PciPort, |(pid, number)| {
+            SerialPortType::UsbPort(UsbPortInfo {
+                vid: USB_VENDOR,
+                pid,
+                serial_number: number.map(str::to_owned),
+                manufacturer: None,
+                product: None,
+            })
+        });
+        SerialPortInfo { port_name: name.to_owned(), port_type }
+    }
+
+    #[test]
+    fn a_board_is_chosen_by_its_serial_number() {
+        let other = port("/dev/ttyACM0", Some((0x5740, Some("A1"))));
+        let [first, second] =
+            ["A1", "B2"].map(|number| port(&format!("/dev/{number}"), Some((USB_PRODUCT, Some(number)))));
+        let pci = port("/dev/ttyS0", None);
+        let choice = |ports: &[&SerialPortInfo], wanted: Option<&str>| {
+            let ports: Vec<SerialPortInfo> = ports.iter().map(|port| (*port).clone()).collect();
+            choose(&ports, wanted).map_err(|error| error.to_string())
+        };
+        assert_eq!(choice(&[&pci, &other, &first], None), Ok("/dev/A1".to_owned()));
+        assert_eq!(choice(&[&other, &first, &second], Some("B2")), Ok("/dev/B2".to_owned()));
+        let refusals = [
+            (
+                choice(&[&first, &second], None),
+                "auto: 2 boards found (/dev/A1 with serial number A1, /dev/B2 with serial number B2); choose one with \
+                 --port serial:NUMBER",
+            ),
+            (
+                choice(&[&other, &second], Some("A1")),
+                "serial:A1: no board has this serial number (/dev/B2 with serial number B2); correct it",
+            ),
+            (
+                choice(&[&pci, &other], Some("A1")),
+                "serial:A1: no USB device 1209:b0d7 found (/dev/ttyS0, /dev/ttyACM0); check the cable, or name the port",
+            ),
+            (
+                choice(&[], None),
+                "auto: no USB device 1209:b0d7 found (no port at all); check the cable, or name the port",
+            ),
+        ];
+        for (got, expected) in refusals {
+            assert_eq!(got, Err(expected.to_owned()));
+        }
+    }
+
+    #[test]
+    fn a_missing_permission_offers_the_udev_rule() {
+        let kind = ErrorKind::Io(io::ErrorKind::PermissionDenied);
+        let error = open_error("/dev/ttyACM0", &serialport::Error::new(kind, "denied")).to_string();
+        assert!(error.starts_with("/dev/ttyACM0: this user may not open the port; "), "{error}");
+        let ids =
+            format!("ATTRS{{idVendor}}==\"{USB_VENDOR:04x}\", ATTRS{{idProduct}}==\"{USB_PRODUCT:04x}\"");
+        assert!(error.contains(&ids) && error.contains("/etc/udev/rules.d/70-bowden.rules"), "{error}");
     }
 }

@@ -156,6 +156,70 @@ impl Session {
         }
     }
 
+    /// Gives a port that is broken back to the system.
+    pub fn hang_up(&mut self) {
+        self.driving = false;
+        self.client.hang_up();
+    }
+
+    /// Goes on with the same board at another connection, `away` after the one before broke; the bridge is off. Returns whether
+    /// the board started again meanwhile.
+    ///
+    /// # Errors
+    /// [`LinkError::Changed`], or no answer.
+    pub fn adopt(&mut self, mut client: Client, away: Duration) -> Result<bool, LinkError> {
+        client.hurry(self.alive_interval);
+        if let Some(difference) = self.parameters.difference(&ParameterSet::read(&mut client)?) {
+            return Err(LinkError::Changed(difference));
+        }
+        let restarted = client.continue_from(&self.client, away)?;
+        self.client = client;
+        self.said_alive = self.client.now();
+        self.off()?;
+        if self.watched {
+            self.passed = (self.client.now(), self.client.status()?.tick);
+            self.client.switch_telemetry(true)?;
+        }
+        Ok(restarted)
+    }
+
+    /// Gives every tick to `sink`, whatever the joint does, until `sink` breaks or the user stops. Nothing is asked of the joint.
+    ///
+    /// # Errors
+    /// When the link breaks or the board started again.
+    pub fn observe(
+        &mut self,
+        stop: Stop,
+        sink: &mut dyn FnMut(&RunTick) -> ControlFlow<()>,
+    ) -> Result<RunEnd, LinkError> {
+        self.client.switch_telemetry(true)?;
+        let end = self.listen_on(stop, sink)?;
+        self.client.switch_telemetry(self.watched)?;
+        Ok(end)
+    }
+
+    fn listen_on(
+        &mut self,
+        stop: Stop,
+        sink: &mut dyn FnMut(&RunTick) -> ControlFlow<()>,
+    ) -> Result<RunEnd, LinkError> {
+        loop {
+            self.client.listen(LISTEN_INTERVAL.min(self.alive_interval))?;
+            while let Some(telemetry) = self.client.telemetry() {
+                let period_ns = telemetry.batch.period_ns;
+                for (tick, sample) in (telemetry.first_tick..).zip(&telemetry.batch.samples) {
+                    if sink(&RunTick { tick, period_ns, sample: *sample }).is_break() {
+                        return Ok(RunEnd::Complete);
+                    }
+                }
+            }
+            if stop() {
+                return Ok(RunEnd::Interrupted);
+            }
+            self.say_alive()?;
+        }
+    }
+
     /// Brings the board from where it is to ready: self test and pretension check. A joint that moves is stopped first.
     ///
     /// # Errors

@@ -3,6 +3,23 @@
 use std::io;
 use std::time::Duration;
 
+/// In place of a port that was given back.
+pub(super) struct Gone(pub(super) Duration);
+
+impl Transport for Gone {
+    fn read(&mut self, _: &mut [u8], _: Duration) -> io::Result<usize> {
+        Err(io::ErrorKind::BrokenPipe.into())
+    }
+
+    fn write(&mut self, _: &[u8]) -> io::Result<()> {
+        Err(io::ErrorKind::BrokenPipe.into())
+    }
+
+    fn now(&self) -> Duration {
+        self.0
+    }
+}
+
 /// A way to a board: bytes out, bytes in, and a clock that goes with them.
 ///
 /// # Contract

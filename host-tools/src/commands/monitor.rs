@@ -11,12 +11,13 @@ use bowden_host_link::LinkError;
 use bowden_host_link::capture::Capture;
 use bowden_host_link::conversion::Conversion;
 use bowden_host_link::hub::{Hub, Next, Reader};
-use bowden_host_link::operator::{Desk, Plan, operate};
+use bowden_host_link::operator::{Desk, Plan, operate_through};
 use bowden_host_link::recorder::{Recorder, Tally};
+use bowden_host_link::replug::Replug;
 use bowden_host_link::session::Session;
 
 use super::course::{CourseArguments, run_seconds};
-use super::port::PortArguments;
+use super::port::{PortArguments, ReplugArguments};
 use crate::interrupt;
 use crate::monitor::keys;
 use crate::monitor::recording::{self, Progress};
@@ -45,6 +46,8 @@ const RECORDING_ROOM: usize = 2_000_000;
 pub struct MonitorArguments {
     #[command(flatten)]
     port: PortArguments,
+    #[command(flatten)]
+    replug: ReplugArguments,
     /// Recording to write meanwhile, of every tick in every state (.csv, .csv.gz, .mcap)
     #[arg(long, value_name = "REC.mcap")]
     record: Option<PathBuf>,
@@ -87,6 +90,7 @@ impl MonitorArguments {
         interrupt::catch()?;
 
         let mut session = Session::new(self.port.connect_live()?)?;
+        let replug = self.port.replug(self.replug);
         self.course.check(&plan.course, &session.parameters().control())?;
         let client = session.client();
         let greeting = client.greeting();
@@ -100,7 +104,8 @@ impl MonitorArguments {
         let hub = Hub::default();
         let to_disk = recorder.as_ref().map(|_| hub.subscribe(RECORDING_ROOM));
         let recorder = recorder.zip(to_disk.as_ref());
-        let ended = attend(&mut session, &plan, &hub, watch, screen, recorder, server);
+        let work = Work { plan: &plan, replug: &replug, hub: &hub, recorder, server };
+        let ended = attend(&mut session, work, watch, screen);
         let not_recorded = to_disk.map_or(0, |reader| reader.lost());
         self.conclude(ended, not_recorded, &mut session)
     }
@@ -114,8 +119,16 @@ impl MonitorArguments {
     ) -> Result<Option<(Recorder, String)>, Failure> {
         let (Some(out), Some(format)) = (self.record.as_deref(), format) else { return Ok(None) };
         let origin = super::origin();
-        let capture =
-            Capture { out, format, mode: plan.mode, every: 1, seconds: None, origin: &origin, rig: None };
+        let capture = Capture {
+            out,
+            format,
+            mode: plan.mode,
+            every: 1,
+            seconds: None,
+            origin: &origin,
+            rig: None,
+            replug: None,
+        };
         Ok(Some((capture.recorder(session)?, out.display().to_string())))
     }
 
@@ -159,16 +172,18 @@ impl MonitorArguments {
     }
 }
 
-/// Owns the port in this thread while others show, read keys and record; until somebody quits or something breaks.
-fn attend(
-    session: &mut Session,
-    plan: &Plan,
-    hub: &Hub,
-    mut watch: Watch,
-    screen: Screen,
-    recorder: Option<((Recorder, String), &Reader)>,
+/// What is done with the joint, and who reads along.
+struct Work<'w> {
+    plan: &'w Plan,
+    replug: &'w Replug,
+    hub: &'w Hub,
+    recorder: Option<((Recorder, String), &'w Reader)>,
     server: Option<Server>,
-) -> Ended {
+}
+
+/// Owns the port in this thread while others show, read keys, record and serve; until somebody quits or something breaks.
+fn attend(session: &mut Session, work: Work, mut watch: Watch, screen: Screen) -> Ended {
+    let Work { plan, replug, hub, recorder, server } = work;
     let (desk, progress) = (Desk::default(), Progress::default());
     let to_screen = hub.subscribe(SCREEN_ROOM);
     let address = server.as_ref().map_or_else(String::new, Server::address);
@@ -188,8 +203,9 @@ fn attend(
             result
         });
         let keys = threads.spawn(|| keys::read(&desk));
-        let link =
-            session.watch(hub.clone()).and_then(|()| operate(session, &desk, plan, &interrupt::requested));
+        let link = session
+            .watch(hub.clone())
+            .and_then(|()| operate_through(session, &desk, plan, replug, &interrupt::requested));
         desk.quit();
         hub.close();
         let panicked = || io::Error::other("internal error");

@@ -2,21 +2,35 @@
 
 use std::time::Duration;
 
+use bowden_host_link::replug::Replug;
 use bowden_host_link::{Client, LinkError};
 
 /// Arguments that say which board.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PortArguments {
-    /// Serial port of the board, `auto` for the one on USB, or `sim` for a simulated board with a simulated joint,
+    /// Serial port of the board, `auto` for the one on USB, `serial:NUMBER` for the one with this serial number, or `sim` for a simulated board with a simulated joint,
     /// switched on anew each time; `sim:joint_backlash:0.8,seed=7` for one that conceals something
-    #[arg(long, value_name = "PATH|auto|sim")]
+    #[arg(long, value_name = "PATH|auto|serial:NUMBER|sim")]
     port: String,
     /// How long an answer of the board is waited for, s
     #[arg(long, value_name = "SECONDS", default_value = "1.5", value_parser = timeout)]
     timeout: Duration,
 }
 
+/// Arguments that say how long a board is waited for that was unplugged.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct ReplugArguments {
+    /// How long a board that was unplugged is waited for, s; it goes on with the joint stopped. 0: not at all
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = patience)]
+    replug: Duration,
+}
+
 impl PortArguments {
+    /// How the board is found again after it was unplugged; to be asked for while it is there.
+    pub fn replug(&self, arguments: ReplugArguments) -> Replug {
+        Replug::new(&self.port, self.timeout, arguments.replug)
+    }
+
     /// Opens the port and greets the board.
     ///
     /// # Errors
@@ -38,5 +52,12 @@ fn timeout(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.05..=600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
         _ => Err("allowed 0.05 to 600 s".to_owned()),
+    }
+}
+
+fn patience(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("allowed 0 to 86400 s".to_owned()),
     }
 }

@@ -15,7 +15,7 @@ use bowden_host_link::session::{RunEnd, Session};
 use bowden_host_link::{LinkError, ParameterSet};
 
 use super::course::{CourseArguments, run_seconds};
-use super::port::PortArguments;
+use super::port::{PortArguments, ReplugArguments};
 use crate::interrupt;
 
 /// Arguments of `bowden record`.
@@ -29,6 +29,8 @@ use crate::interrupt;
 pub struct RecordArguments {
     #[command(flatten)]
     port: PortArguments,
+    #[command(flatten)]
+    replug: ReplugArguments,
     /// Recording to write (.csv, .csv.gz, .mcap)
     #[arg(long, value_name = "REC.csv")]
     out: PathBuf,
@@ -94,6 +96,7 @@ impl RecordArguments {
             parameters.write(&mut client, &parameters.load(path)?)?;
         }
         let mut session = Session::new(client)?;
+        let replug = self.port.replug(self.replug);
         self.course.check(&course, &session.parameters().control())?;
         progress.stage("self test and pretension check", 0);
         session.ready(stop)?;
@@ -113,6 +116,7 @@ impl RecordArguments {
             seconds,
             origin: &origin,
             rig: self.rig.is_some().then_some((&name, self.load)),
+            replug: Some(&replug),
         };
         let (tally, end) = capture.run(&mut session, &course, stop, progress)?;
 
@@ -151,6 +155,7 @@ impl RecordArguments {
             }
             Err(error) => return Err(Failure::failed(format!("{error}; {kept}"))),
         }
+        outcome.extend(tally.absences().map(|absences| format!("{out}: {absences}")));
         outcome.extend(loss.map(|loss| format!("{out}: {loss}")));
         super::print(&format!(
             "{out}: {} rows over {:.3} s, tick {:.1} us\n",

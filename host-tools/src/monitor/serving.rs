@@ -1,6 +1,5 @@
 //! The live data for Foxglove: a websocket server on the loopback.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -190,17 +189,17 @@ fn sample_schema(columns: &[RowColumn]) -> Schema {
         };
         (column.name().to_owned(), unit)
     });
-    schema("bowden.Sample", [time].into_iter().chain(columns).chain(torques).collect())
+    schema("bowden.Sample", [time].into_iter().chain(columns).chain(torques))
 }
 
 fn link_schema() -> Schema {
-    schema("bowden.Link", LINK_FIELDS.iter().map(|name| ((*name).to_owned(), "count".to_owned())).collect())
+    schema("bowden.Link", LINK_FIELDS.iter().map(|name| ((*name).to_owned(), "count".to_owned())))
 }
 
 /// JSON schema of an object of numbers with their units.
-fn schema(name: &str, fields: BTreeMap<String, String>) -> Schema {
+fn schema(name: &str, fields: impl IntoIterator<Item = (String, String)>) -> Schema {
     let fields: Vec<String> = fields
-        .iter()
+        .into_iter()
         .map(|(name, unit)| format!("\"{name}\":{{\"type\":\"number\",\"description\":\"{unit}\"}}"))
         .collect();
     let text =

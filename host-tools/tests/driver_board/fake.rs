@@ -165,7 +165,7 @@ impl Fake {
         self.values[PARAMETERS.iter().position(|parameter| parameter.0 == name).unwrap()]
     }
 
-    fn set(&mut self, name: &str, value: f32) {
+    pub fn set(&mut self, name: &str, value: f32) {
         let index = PARAMETERS.iter().position(|parameter| parameter.0 == name).unwrap();
         self.values[index] = value;
     }
@@ -251,11 +251,7 @@ impl Fake {
             self.trip(Fault::Slack, 2, 0.25, 1.0);
         }
         if self.mishaps.restart_after == Some(self.ran_ticks) {
-            self.state = State::Off;
-            self.tick = 0;
-            self.telemetry = false;
-            self.batch = Batch::default();
-            self.next_frame = 0;
+            self.switch_off_and_on();
         }
     }
 
@@ -478,6 +474,16 @@ impl Fake {
         // Half of a frame is what a program that ends may leave.
         self.outgoing[0].1.drain(..100);
         self.tick = tick;
+    }
+
+    /// What is left of a board that was without supply for a moment.
+    pub fn switch_off_and_on(&mut self) {
+        self.state = State::Off;
+        self.tick = 0;
+        self.telemetry = false;
+        self.batch = Batch::default();
+        self.next_frame = 0;
+        self.outgoing.clear();
     }
 
     /// Shortens the time for which the host may be silent.

@@ -212,7 +212,7 @@ fn without_a_terminal_or_an_output_it_does_not_begin() {
 fn a_pulled_plug_ends_it_with_the_recording_kept() {
     let mut terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
-    let mut screen = watch(&terminal, folder.path(), &["--record", "a.csv"]);
+    let mut screen = watch(&terminal, folder.path(), &["--record", "a.csv", "--replug", "0"]);
     screen.wait_for("a.csv: ");
     terminal.unplug();
     let (status, stderr) = screen.end();

@@ -43,8 +43,15 @@ fn a_port_that_another_program_has_open_is_told() {
     let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let port = terminal.port();
     let _other = serialport::new(port, 115_200).timeout(Duration::from_secs(1)).open().unwrap();
-    let expected = format!("{port}: another program has the port open; close that one first");
-    assert_refused(&["send", "--port", port, "status"], &expected);
+    let folder = tempfile::tempdir().unwrap();
+    let (status, _, stderr) = bowden(folder.path(), &["send", "--port", port, "status"]);
+    assert_eq!(status, 2);
+    // This test is the other program.
+    let holder = format!("(process {}) has the port open; close that one first\n", std::process::id());
+    assert!(
+        stderr.starts_with(&format!("bowden: {port}: `driver_board")) && stderr.ends_with(&holder),
+        "{stderr}"
+    );
 }
 
 #[test]

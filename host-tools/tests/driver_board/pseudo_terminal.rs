@@ -4,9 +4,10 @@
 //! [`TIME_PER_REQUEST`], and only while the terminal has room for what the board sends. A slow host is therefore never silent to
 //! the board and loses no sample. The host, whose clock is real, gives up after [`ANSWER_LIMIT_S`] without an answer.
 
-use std::fs::File;
+use std::fs::{File, remove_file};
 use std::io::{Read, Write};
-use std::path::Path;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -45,12 +46,26 @@ pub struct Terminal {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     port: String,
+    /// Other name of the port, which stays when it is plugged in again.
+    link: Option<PathBuf>,
     // Keeps the terminal alive between two programs that use it.
     _slave: File,
 }
 
 impl Terminal {
     pub fn new(fake: Fake) -> Self {
+        Self::plugged(Arc::new(Mutex::new(fake)))
+    }
+
+    /// The same under a name of its own, by which it is found again after it was unplugged.
+    pub fn linked(fake: Fake, link: PathBuf) -> Self {
+        let mut terminal = Self::new(fake);
+        symlink(&terminal.port, &link).unwrap();
+        terminal.link = Some(link);
+        terminal
+    }
+
+    fn plugged(fake: Arc<Mutex<Fake>>) -> Self {
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let master = openpt(flags).unwrap();
         grantpt(&master).unwrap();
@@ -62,15 +77,14 @@ impl Terminal {
         tcsetattr(&slave, OptionalActions::Now, &settings).unwrap();
         fcntl_setfl(&master, OFlags::NONBLOCK).unwrap();
 
-        let fake = Arc::new(Mutex::new(fake));
         let stop = Arc::new(AtomicBool::new(false));
         let (shared, stopped) = (Arc::clone(&fake), Arc::clone(&stop));
         let thread = std::thread::spawn(move || serve(&mut File::from(master), &shared, &stopped));
-        Self { fake, stop, thread: Some(thread), port, _slave: slave }
+        Self { fake, stop, thread: Some(thread), port, link: None, _slave: slave }
     }
 
     pub fn port(&self) -> &str {
-        &self.port
+        self.link.as_ref().map_or(&self.port, |link| link.to_str().unwrap())
     }
 
     pub fn fake(&self) -> MutexGuard<'_, Fake> {
@@ -79,7 +93,7 @@ impl Terminal {
 
     /// Command line of `bowden` for this board.
     pub fn command(&self, folder: &Path, name: &str, arguments: &[&str]) -> Command {
-        let board = [name, "--port", &self.port, "--timeout", ANSWER_LIMIT_S];
+        let board = [name, "--port", self.port(), "--timeout", ANSWER_LIMIT_S];
         crate::command(folder, &[&board, arguments].concat())
     }
 
@@ -98,6 +112,19 @@ impl Terminal {
     pub fn unplug(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.take().unwrap().join().unwrap();
+        if let Some(link) = &self.link {
+            remove_file(link).unwrap();
+        }
+    }
+
+    /// Plugs the board in again, as another device.
+    pub fn replug(&mut self) {
+        let link = self.link.take();
+        *self = Self::plugged(Arc::clone(&self.fake));
+        if let Some(link) = &link {
+            symlink(&self.port, link).unwrap();
+        }
+        self.link = link;
     }
 }
 

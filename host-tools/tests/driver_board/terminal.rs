@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fs;
 use std::io::Read;
 use std::path::Path;
-use std::process::{Child, Command};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use bowden_core::recording::{Column, ReadOptions, Recording};
@@ -321,16 +321,16 @@ fn single_steps_lead_from_state_to_state() {
 }
 
 /// Bytes of a recording that holds more than 1000 rows in either format: a row of CSV takes less than 250, one of MCAP less.
-const THOUSAND_ROWS: u64 = 250_000;
+pub const THOUSAND_ROWS: u64 = 250_000;
 
 /// Bytes on the disk of the recording that is being written in `folder`.
-fn recorded_bytes(folder: &Path) -> u64 {
+pub fn recorded_bytes(folder: &Path) -> u64 {
     // A file that gets its final name meanwhile counts as empty.
     fs::read_dir(folder).unwrap().map(|file| file.unwrap().metadata().map_or(0, |file| file.len())).sum()
 }
 
 /// Waits until `bowden record` has written so many bytes to its file in `folder`.
-fn wait_for_bytes(bytes: u64, folder: &Path, child: &mut Child) {
+pub fn wait_for_bytes(bytes: u64, folder: &Path, child: &mut Child) {
     while recorded_bytes(folder) < bytes {
         if let Some(status) = child.try_wait().unwrap() {
             let mut stderr = String::new();
@@ -341,7 +341,7 @@ fn wait_for_bytes(bytes: u64, folder: &Path, child: &mut Child) {
     }
 }
 
-fn signal(child: &Child, name: &str) {
+pub fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
 }
 
@@ -370,7 +370,8 @@ fn a_pulled_plug_keeps_the_rows_before_it() {
     let mut terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();
     let port = terminal.port().to_owned();
-    let mut child = terminal.start_recording(folder.path(), "a.csv");
+    let mut command = terminal.command(folder.path(), "record", &["--out", "a.csv", "--replug", "0"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for_bytes(THOUSAND_ROWS, folder.path(), &mut child);
     terminal.unplug();
     let (status, _, stderr) = result_of(&child.wait_with_output().unwrap());

@@ -88,6 +88,7 @@ impl Driver<'_> {
             seconds: Some(*seconds),
             origin: &origin,
             rig: None,
+            replug: None,
         };
         let (tally, end) = capture.run(&mut self.session, course, self.stop, self.progress)?;
         self.recorded.push(Recorded {
