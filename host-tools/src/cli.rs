@@ -38,6 +38,8 @@ enum Command {
     Check(CheckArguments),
     /// Find which physics the simulation of a rig lacks
     Diagnose(crate::commands::diagnose::DiagnoseArguments),
+    /// Diagnose every recording of a folder and put the benches side by side
+    Survey(crate::commands::survey::SurveyArguments),
     /// Write a recording in another format
     Convert(ConvertArguments),
     /// Show what is in recordings: rate, gaps, faults, ranges, who made them, and a curve
@@ -103,6 +105,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
     match &cli.command {
         Command::Check(arguments) => arguments.run(),
         Command::Diagnose(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Survey(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Convert(arguments) => under_way(cli, "converting", || arguments.run()),
         Command::Info(arguments) => arguments.run(),
         Command::Recover(arguments) => arguments.run(),

@@ -20,6 +20,7 @@ pub mod replay;
 pub mod send;
 pub mod shell;
 pub mod simulate;
+pub mod survey;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -20,5 +20,6 @@ pub mod rig;
 pub mod simulate;
 pub mod simulation;
 pub mod study;
+pub mod survey;
 #[cfg(test)]
 mod test_bench;

@@ -11,6 +11,7 @@ mod errors;
 mod recording;
 mod rig;
 mod study;
+mod survey;
 mod work;
 
 /// The native part of the package `bowden`.
@@ -24,6 +25,8 @@ mod _bowden {
     use crate::rig::NativeRig;
     #[pymodule_export]
     use crate::study::{NativeStudy, fit};
+    #[pymodule_export]
+    use crate::survey::{NativePlan, survey_one, survey_page};
     #[pymodule_export]
     use crate::work::{replay, simulate};
 }

@@ -15,6 +15,7 @@ SI units throughout; the unit is in the name. `bowden.plots` draws with matplotl
 
 from bowden.diagnosis import Diagnosis, Trace
 from bowden.errors import Error, InputError, RepairedWarning, StoppedEarlyWarning
+from bowden.progress import ProgressLike
 from bowden.recording import UNITS, Frame, Recording, RecordingLike
 from bowden.results import (
     ChannelError,
@@ -35,7 +36,8 @@ from bowden.results import (
 )
 from bowden.rig import Rig, RigLike
 from bowden.study import Study, StudyRecording
-from bowden.work import Fit, Motion, ProgressLike, diagnose, fit, replay, simulate
+from bowden.surveys import Survey, survey
+from bowden.work import Fit, Motion, diagnose, fit, replay, simulate
 
 __all__ = [
     "UNITS",
@@ -68,10 +70,12 @@ __all__ = [
     "StoppedEarlyWarning",
     "Study",
     "StudyRecording",
+    "Survey",
     "Trace",
     "Unexplained",
     "diagnose",
     "fit",
     "replay",
     "simulate",
+    "survey",
 ]

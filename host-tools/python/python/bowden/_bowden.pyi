@@ -1,7 +1,8 @@
 """The native part of the package; use the classes and functions of `bowden` instead."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set as AbstractSet
 from os import PathLike
+from pathlib import Path
 from typing import Self, final
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "NativeDiagnosis",
+    "NativePlan",
     "NativeRecording",
     "NativeRig",
     "NativeStudy",
@@ -17,6 +19,8 @@ __all__ = [
     "fit",
     "replay",
     "simulate",
+    "survey_one",
+    "survey_page",
 ]
 
 _Floats = NDArray[np.float64]
@@ -91,7 +95,16 @@ class NativeDiagnosis:
     ) -> list[tuple[str, str, _Floats, _Floats, _Floats, _Floats, NDArray[np.bool_]]]: ...
     def report_html(self) -> str: ...
     def rigs(self) -> list[tuple[str, NativeRig]]: ...
-    def save(self, folder: _Path) -> str | PathLike[str]: ...
+    def save(self, folder: _Path) -> Path: ...
+
+@final
+class NativePlan:
+    def __new__(cls, folder: _Path, rules: Sequence[tuple[str, _Path]], out: _Path) -> Self: ...
+    def __len__(self) -> int: ...
+    def survey(self, watcher: _Watcher | None, jobs: int) -> tuple[int, int, int, list[tuple[str, str]]]: ...
+    def pending(self) -> list[tuple[str, Path, str, Path | None]]: ...
+    def keep(self, json: str) -> None: ...
+    def summarise(self, failed: Sequence[tuple[str, str]], left: AbstractSet[str]) -> Path: ...
 
 def channels() -> list[tuple[str, str]]: ...
 def diagnose(
@@ -109,3 +122,5 @@ def simulate(
     rate_hz: float,
     seed: int,
 ) -> NativeRecording: ...
+def survey_one(recording: str, path: _Path, bench: str, rig: _Path | None) -> str: ...
+def survey_page(folder: _Path) -> Path: ...

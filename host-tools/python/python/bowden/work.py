@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,15 +13,13 @@ from numpy.typing import ArrayLike
 from bowden import _bowden
 from bowden.diagnosis import Diagnosis
 from bowden.errors import InputError, RepairedWarning, StoppedEarlyWarning
+from bowden.progress import ProgressLike, threads, watching
 from bowden.recording import Recording, RecordingLike, as_recording
 from bowden.results import ChannelError, FittedParameter, read
 from bowden.rig import Rig, RigLike, as_rig
 from bowden.study import Study, as_study
 
-__all__ = ["Fit", "Motion", "ProgressLike", "diagnose", "fit", "replay", "simulate"]
-
-ProgressLike = bool | Callable[[str, int, int], object]
-"""True: a bar of tqdm. False: nothing. A function: called with the stage's name, the steps done and all steps (0: not known)."""
+__all__ = ["Fit", "Motion", "diagnose", "fit", "replay", "simulate"]
 
 Motion = Literal["lab", "sine", "triangle", "multisine", "staircase", "rest"]
 """A built-in motion of the reference."""
@@ -87,8 +83,8 @@ def diagnose(
     """
     study = as_study(recordings, rig, heldout)._native()
     _warn(study.notes)
-    with _watching(progress) as watcher:
-        diagnosis = Diagnosis(_bowden.diagnose(study, list(also), watcher, _threads(jobs)))
+    with watching(progress) as watcher:
+        diagnosis = Diagnosis(_bowden.diagnose(study, list(also), watcher, threads(jobs)))
     if not diagnosis.complete:
         reason = "stopped early: not every effect was tried; run it again to the end before trusting it"
         warnings.warn(reason, StoppedEarlyWarning, stacklevel=2)
@@ -105,8 +101,8 @@ def fit(
     """Recalibrates the nominal parameters of a rig to recordings; adds no physics. Arguments as for `diagnose`."""
     study = as_study(recordings, rig, ())._native()
     _warn(study.notes)
-    with _watching(progress) as watcher:
-        text, rigs = _bowden.fit(study, watcher, _threads(jobs))
+    with watching(progress) as watcher:
+        text, rigs = _bowden.fit(study, watcher, threads(jobs))
     said = json.loads(text)
     return Fit(
         parameters=read(tuple[FittedParameter, ...], said["parameters"]),
@@ -170,42 +166,6 @@ def simulate(
     return Recording._of(_bowden.simulate(as_rig(rig)._native, motion, pair, seconds, float(rate_hz), int(seed)))
 
 
-def _threads(jobs: int | None) -> int | None:
-    if jobs is not None and not 1 <= jobs <= 1024:
-        message = f"jobs: got {jobs}, allowed 1 to 1024; change it"
-        raise InputError(message, hint="change it")
-    return jobs
-
-
 def _warn(notes: Iterable[str]) -> None:
     for note in notes:
         warnings.warn(note, RepairedWarning, stacklevel=3)
-
-
-@contextmanager
-def _watching(progress: ProgressLike) -> Iterator[Callable[[str, int, int], object] | None]:
-    if not isinstance(progress, bool):
-        yield progress
-        return
-    if not progress:
-        yield None
-        return
-    from tqdm.auto import tqdm
-
-    # No bar for what is done at once, none left behind when the work is over.
-    with tqdm(delay=0.5, leave=False, file=sys.stderr, dynamic_ncols=True) as bar:
-        shown = ""
-
-        def watcher(stage: str, done: int, steps: int) -> None:
-            nonlocal shown
-            if stage != shown:
-                shown = stage
-                bar.reset(total=steps or None)
-                bar.set_description(stage, refresh=False)
-            bar.total = steps or None
-            bar.n = done
-            bar.refresh()
-
-        yield watcher
-
-
