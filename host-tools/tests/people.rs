@@ -15,7 +15,12 @@ fn subcommands() -> Vec<String> {
     let lines =
         help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
     let names: Vec<String> =
-        lines.filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect();
+        // A line that goes on with what a command does begins farther right.
+        lines
+            .filter(|line| !line.starts_with("   "))
+            .filter_map(|line| line.split_whitespace().next())
+            .map(str::to_owned)
+            .collect();
     assert!(names.len() > 15, "{help}");
     names.into_iter().filter(|name| name != "help").collect()
 }

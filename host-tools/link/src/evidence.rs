@@ -67,9 +67,14 @@ pub fn of_board(greeting: &Greeting, port: &str, origin: &Origin, mode: Mode, ev
     metadata
 }
 
+/// Both clocks when the first row comes.
+pub fn started() -> Vec<(String, String)> {
+    clocks("started")
+}
+
 /// Adds when the first row came, and its tick.
-pub fn begin(metadata: &mut Metadata, tick: u64, period_ns: u32) {
-    metadata.extend(RECORDING_GROUP, clocks("started"));
+pub fn begin(metadata: &mut Metadata, started: Vec<(String, String)>, tick: u64, period_ns: u32) {
+    metadata.extend(RECORDING_GROUP, started);
     metadata.extend(
         RECORDING_GROUP,
         [("first_tick".into(), tick.to_string()), ("period_ns".into(), period_ns.to_string())],

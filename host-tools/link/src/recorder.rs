@@ -5,6 +5,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 
 use bowden_core::outcome::Failure;
@@ -28,6 +29,8 @@ pub struct Recorder {
     conversion: Conversion,
     every: u64,
     metadata_file: Option<PathBuf>,
+    /// Clocks at the first row, which the thread that writes may see late.
+    started: Arc<OnceLock<Vec<(String, String)>>>,
     tally: Tally,
 }
 
@@ -95,9 +98,11 @@ impl Recorder {
         let (rows, received) = sync_channel(QUEUE);
         let (conversion, every) = (form.conversion, form.every.max(1));
         let metadata_file = form.metadata_file.clone();
-        let writer = thread::spawn(move || write(file, &form, &received));
+        let started = Arc::new(OnceLock::new());
+        let started_there = Arc::clone(&started);
+        let writer = thread::spawn(move || write(file, &form, &received, &started_there));
         let path = path.to_owned();
-        Self { path, rows, writer, conversion, every, metadata_file, tally: Tally::default() }
+        Self { path, rows, writer, conversion, every, metadata_file, started, tally: Tally::default() }
     }
 
     /// Takes a tick; `false` once the medium has refused, which [`Recorder::finish`] tells.
@@ -124,6 +129,7 @@ impl Recorder {
             return true;
         }
         tally.rows += 1;
+        self.started.get_or_init(evidence::started);
         self.rows.send(*tick).is_ok()
     }
 
@@ -165,7 +171,12 @@ impl Recorder {
 }
 
 /// Writes what comes, and puts it on the medium when it is due.
-fn write(file: DurableFile, form: &Form, received: &Receiver<RunTick>) -> Written {
+fn write(
+    file: DurableFile,
+    form: &Form,
+    received: &Receiver<RunTick>,
+    started: &OnceLock<Vec<(String, String)>>,
+) -> Written {
     let Ok(first) = received.recv() else {
         file.abandon();
         return Ok(None);
@@ -175,7 +186,8 @@ fn write(file: DurableFile, form: &Form, received: &Receiver<RunTick>) -> Writte
         output::write_text(path, text).map_err(nothing)?;
     }
     let mut metadata = form.metadata.clone();
-    evidence::begin(&mut metadata, first.tick, first.period_ns);
+    let started = started.get_or_init(evidence::started).clone();
+    evidence::begin(&mut metadata, started, first.tick, first.period_ns);
     if let Some(path) = &form.metadata_file {
         output::write_text(path, &metadata.to_toml()).map_err(nothing)?;
     }
