@@ -64,6 +64,10 @@ enum Command {
     Params(crate::commands::params::ParamsArguments),
     /// Show the fault of a driver board, what led to it, and clear it
     Faults(crate::commands::faults::FaultsArguments),
+    /// Print the log of a driver board's firmware, with time and level
+    Log(crate::commands::log::LogArguments),
+    /// Make a recording of a bench run that the firmware logged
+    Import(crate::commands::import::ImportArguments),
     /// Say whether this machine and the board are ready for work, and what to do where they are not
     Doctor(crate::commands::doctor::DoctorArguments),
     /// Print what completes this command line in a shell
@@ -118,6 +122,8 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),
         Command::Faults(arguments) => arguments.run(),
+        Command::Log(arguments) => arguments.run(),
+        Command::Import(arguments) => arguments.run(),
         Command::Doctor(arguments) => arguments.run(),
         Command::Completions(arguments) => arguments.run(Cli::command()),
         Command::Man(arguments) => arguments.run(Cli::command()),

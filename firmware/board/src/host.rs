@@ -19,7 +19,7 @@ use crate::retained::{self, Ended};
 use crate::store_flash::StoreFlash;
 use crate::telemetry::ANSWERS;
 use crate::usb::{PACKET, UsbDriver};
-use crate::{BOARD, TABLE_STORE, bridge, encoders, tick};
+use crate::{BOARD, TABLE_STORE, boot_loader, bridge, encoders, tick};
 
 /// Time between two looks at the silence of the host.
 const SUPERVISION: Duration = Duration::from_millis(5);
@@ -241,6 +241,11 @@ impl Host {
                 say(request.sequence, FromBoard::Done);
                 Timer::after(LAST_WORDS).await;
                 return suffer(provocation);
+            }
+            Reply::BootLoader => {
+                say(request.sequence, FromBoard::Done);
+                Timer::after(LAST_WORDS).await;
+                boot_loader::leave();
             }
         };
         tick::set_telemetry(self.service.telemetry());

@@ -17,6 +17,7 @@
 #![no_main]
 
 mod analog;
+mod boot_loader;
 mod bridge;
 mod chip;
 mod clock;
@@ -63,6 +64,7 @@ const ONCE: &str = "each task is started once";
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
+    boot_loader::enter_if_asked();
     // The HAL leaves its time driver at priority 0, which critical sections do not mask.
     interrupt::TIM5.set_priority(Priority::P3);
     let boot = retained::boot_cause();

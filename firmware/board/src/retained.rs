@@ -28,9 +28,14 @@ pub struct Retained {
     text: [AtomicU8; PANIC_TEXT],
     /// Restarts since a host was there, under [`COUNTED`].
     restarts: AtomicU32,
+    /// [`LEAVING`] if the next start is for the boot loader.
+    leaving: AtomicU32,
     /// The last ticks.
     pub snapshot: Snapshot,
 }
+
+/// The next start is for the boot loader.
+const LEAVING: u32 = 0xb0bd_df11;
 
 /// Upper three bytes of [`Retained::restarts`], if it is one.
 const COUNTED: u32 = 0xb0bd_5a00;
@@ -59,6 +64,17 @@ pub struct Ended {
     pub fault: Option<Fault>,
     /// Words of a panic or a processor fault.
     pub text: String<PANIC_TEXT>,
+}
+
+/// Keeps that the next start is for the boot loader.
+pub fn leave() {
+    memory().leaving.store(LEAVING, Ordering::Relaxed);
+}
+
+/// Whether this start is for the boot loader; forgets it. Memory holds anything behind power-on, where nobody asked.
+pub fn is_leaving() -> bool {
+    let asked = memory().leaving.swap(0, Ordering::Relaxed) == LEAVING;
+    asked && pac::RCC.csr().read().sftrstf()
 }
 
 /// What started this run; forgets it.
@@ -104,11 +120,7 @@ pub fn take(boot: Boot) -> Ended {
         Boot::Watchdog => ended.fault = Some(Fault::Watchdog),
         Boot::Software if known => {
             ended.fault = Fault::from_number(kept.fault.load(Ordering::Relaxed));
-            let length = usize::from(kept.length.load(Ordering::Relaxed)).min(PANIC_TEXT);
-            for byte in &kept.text[..length] {
-                // Kept as ASCII.
-                let _ = ended.text.push(char::from(byte.load(Ordering::Relaxed)));
-            }
+            ended.text = kept_text();
         }
         _ => {}
     }
@@ -118,6 +130,14 @@ pub fn take(boot: Boot) -> Ended {
         kept.snapshot.clear();
     }
     ended
+}
+
+/// The words that are kept.
+pub fn kept_text() -> String<PANIC_TEXT> {
+    let kept = memory();
+    let length = usize::from(kept.length.load(Ordering::Relaxed)).min(PANIC_TEXT);
+    // Kept as ASCII.
+    kept.text[..length].iter().map(|byte| char::from(byte.load(Ordering::Relaxed))).collect()
 }
 
 /// Keeps a fault and its words for the run after this one.

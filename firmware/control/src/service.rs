@@ -98,6 +98,8 @@ pub enum Reply {
     Store,
     /// Send [`FromBoard::Done`], then suffer this.
     Suffer(Provocation),
+    /// Send [`FromBoard::Done`], then leave for the processor's boot loader.
+    BootLoader,
 }
 
 /// Longest panic text that is kept, bytes.
@@ -239,6 +241,10 @@ impl Service {
             ToBoard::ReadTable => Ok(FromBoard::Table(self.shelf.report())),
             ToBoard::ReadTablePoints(first) => self.shelf.points(*first),
             ToBoard::ClearTable => self.shelve(None, port),
+            ToBoard::EnterBootLoader => match port.view().state {
+                State::Off | State::Fault => return Reply::BootLoader,
+                state => Err(Refusal::WrongState(state)),
+            },
         };
         Reply::Say(answer.unwrap_or_else(FromBoard::Refused))
     }
@@ -393,7 +399,8 @@ impl Service {
     }
 }
 
-/// Whether a board in safe mode answers: what reads is answered, what would reach tick or flash is not.
+/// Whether a board in safe mode answers: what reads is answered, what would reach tick or flash is not. A new image may be what it
+/// needs.
 const fn answered_in_safe_mode(message: &ToBoard) -> bool {
     matches!(
         message,
@@ -406,6 +413,7 @@ const fn answered_in_safe_mode(message: &ToBoard) -> bool {
             | ToBoard::ReadPanicText
             | ToBoard::ReadTable
             | ToBoard::ReadTablePoints(_)
+            | ToBoard::EnterBootLoader
     )
 }
 

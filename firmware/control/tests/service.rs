@@ -290,3 +290,17 @@ fn a_fault_stays_while_the_stored_table_cannot_be_read() {
         assert_eq!(asked(&mut service, &mut tick, 4, clear()), Reply::Say(FromBoard::Done));
     }
 }
+
+#[test]
+fn the_boot_loader_is_left_for_with_the_bridge_off_only() {
+    for state in [State::Off, State::Fault] {
+        assert_eq!(
+            asked(&mut service(), &mut tick_in(state), 1, ToBoard::EnterBootLoader),
+            Reply::BootLoader
+        );
+    }
+    for state in [State::SelfTest, State::PretensionCheck, State::Ready, State::Homing, State::Run] {
+        let reply = asked(&mut service(), &mut tick_in(state), 1, ToBoard::EnterBootLoader);
+        assert_eq!(reply, refused(Refusal::WrongState(state)));
+    }
+}

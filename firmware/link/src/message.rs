@@ -89,6 +89,8 @@ pub enum ToBoard {
     ReadTablePoints(u16),
     /// Forgets the table.
     ClearTable,
+    /// Leaves the firmware for the processor's own boot loader, which takes a new image over USB; with the bridge off only.
+    EnterBootLoader,
 }
 
 /// What the board says.

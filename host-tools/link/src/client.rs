@@ -447,6 +447,22 @@ impl Client {
         }
     }
 
+    /// Sends the board into its processor's boot loader, where it hears nothing any more. A board that leaves before its answer is
+    /// through has done as it was told.
+    ///
+    /// # Errors
+    /// [`Refusal::WrongState`], unless the bridge is off.
+    pub fn enter_boot_loader(&mut self) -> Result<(), LinkError> {
+        let request = "to enter the boot loader";
+        let sequence = self.number();
+        self.send(&Request { sequence, message: ToBoard::EnterBootLoader })?;
+        match self.answer(sequence, self.timeout) {
+            Ok(Some(FromBoard::Refused(refusal))) => Err(LinkError::Refused { request, refusal }),
+            Ok(_) | Err(LinkError::Comms(CommsError::Broken { .. })) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
     /// A request whose answer is `Done`.
     fn order(&mut self, request: &'static str, message: ToBoard) -> Result<(), LinkError> {
         match self.request(request, message)? {

@@ -17,6 +17,7 @@
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
 //! | [`evidence`] | what a recording says of itself |
+//! | [`firmware_log`] | the firmware's own log, and a recording made of it |
 
 #![forbid(unsafe_code)]
 
@@ -26,6 +27,7 @@ pub mod conversion;
 pub mod course;
 pub mod error;
 pub mod evidence;
+pub mod firmware_log;
 pub mod from_rig;
 pub mod holders;
 pub mod hub;

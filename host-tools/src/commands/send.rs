@@ -46,6 +46,8 @@ enum Action {
     },
     /// Print state, fault, limits and counters
     Status,
+    /// From off or fault: leave the firmware for the processor's own boot loader, which takes a new image over USB
+    BootLoader,
 }
 
 /// Time between two lines of a run, s.
@@ -67,6 +69,13 @@ impl SendArguments {
         }
         if let Action::Run { course, seconds } = &self.action {
             return self.follow(course, *seconds);
+        }
+        if let Action::BootLoader = self.action {
+            self.port.connect()?.enter_boot_loader()?;
+            print(
+                "the board is in its boot loader (USB 0483:df11); flash it, or switch it off and on to leave\n",
+            )?;
+            return Ok(Outcome::done());
         }
         let mut session = Session::new(self.port.connect()?)?;
         match self.action {

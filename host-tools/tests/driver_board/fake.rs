@@ -424,8 +424,11 @@ impl Fake {
             ToBoard::ReadTable => return Ok(FromBoard::Table(TableReport::Unreadable)),
             ToBoard::ReadTablePoints(_) => return Err(Refusal::NoSuchIndex),
             ToBoard::ActivateTable(_) => return Err(Refusal::TableDiffers),
-            ToBoard::Alive | ToBoard::Provoke(_) | ToBoard::WriteTablePoints { .. } | ToBoard::ClearTable => {
-            }
+            ToBoard::Alive
+            | ToBoard::Provoke(_)
+            | ToBoard::WriteTablePoints { .. }
+            | ToBoard::ClearTable
+            | ToBoard::EnterBootLoader => {}
         }
         Ok(FromBoard::Done)
     }

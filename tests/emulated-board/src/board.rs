@@ -12,6 +12,7 @@ use crate::machine::Counters;
 use crate::measure::{Measurement, Spread};
 use crate::memory_map::{FLASH, WRITABLE_FLASH};
 use crate::peripherals::advanced_timer::Leg;
+use crate::peripherals::boot_loader;
 use crate::peripherals::flash::Torn;
 use crate::peripherals::rcc::ResetCause;
 use crate::rig::Rig;
@@ -317,6 +318,17 @@ impl Board {
     /// Takes out the log lines so far.
     pub fn take_log(&mut self) -> Vec<LogLine> {
         self.cpu.rtt_mut().map_or_else(Vec::new, Rtt::take_lines)
+    }
+
+    /// Takes out the bytes of the log so far, as a debug probe reads them from the first RTT channel.
+    pub fn take_log_bytes(&mut self) -> Vec<u8> {
+        self.cpu.rtt_mut().map_or_else(Vec::new, Rtt::take_bytes)
+    }
+
+    /// Whether the core has left the firmware for the manufacturer's boot loader, as it is entered: by the stack and the entry of
+    /// its vector table.
+    pub fn is_in_boot_loader(&self) -> bool {
+        self.cpu.is_in_boot_loader() && self.cpu.stack_pointer() == boot_loader::STACK
     }
 
     /// The bench, as it truly is.

@@ -10,9 +10,11 @@ use crate::elf::Image;
 use crate::error::BoardError;
 use crate::exceptions;
 use crate::machine::{Machine, Sleep, Trap};
-use crate::memory_map::{CCM, CORE, FLASH, PERIPHERALS, RAM, RAM_WITHOUT_CCM, SYSTEM_MEMORY, WRITABLE_FLASH};
+use crate::memory_map::{
+    BOOT_LOADER, CCM, CORE, FLASH, PERIPHERALS, RAM, RAM_WITHOUT_CCM, SYSTEM_MEMORY, WRITABLE_FLASH,
+};
 use crate::peripherals::rcc::ResetCause;
-use crate::peripherals::system_memory;
+use crate::peripherals::{boot_loader, system_memory};
 use crate::processor_fault::{self, Cause};
 use crate::rtt::Rtt;
 use crate::scs::{SV_CALL, Scs};
@@ -91,6 +93,16 @@ impl Cpu {
     /// Number of times the firmware was started.
     pub(crate) fn boots(&self) -> u64 {
         self.boots
+    }
+
+    /// Whether the core runs the manufacturer's boot loader.
+    pub(crate) fn is_in_boot_loader(&self) -> bool {
+        self.uc.reg_read(R::PC).is_ok_and(|pc| BOOT_LOADER.contains(pc as u32))
+    }
+
+    /// Stack pointer.
+    pub(crate) fn stack_pointer(&self) -> u32 {
+        self.uc.reg_read(R::SP).unwrap_or_default() as u32
     }
 
     /// Reads memory, `None` outside of it.
@@ -394,6 +406,8 @@ fn map_memories(uc: &mut Uc<'_>) -> Result<(), BoardError> {
     } else {
         uc.mem_map(u64::from(RAM.start), u64::from(RAM.size), Prot::ALL)?;
     }
+    uc.mem_map(u64::from(BOOT_LOADER.start), u64::from(BOOT_LOADER.size), Prot::READ | Prot::EXEC)?;
+    uc.mem_write(u64::from(BOOT_LOADER.start), &boot_loader::image())?;
     uc.mmio_map_ro(
         u64::from(SYSTEM_MEMORY.start),
         u64::from(SYSTEM_MEMORY.size),

@@ -1,5 +1,6 @@
 //! `bowden-board`: runs a firmware ELF on the emulated driver board.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -51,6 +52,9 @@ struct RunArgs {
     /// Effect to conceal in the bench; strength 1 (default) is a clear fault. May be repeated
     #[arg(long = "effect", value_name = "ID[:STRENGTH]")]
     effects: Vec<String>,
+    /// File to append the bytes of the firmware's log to, for `bowden log`
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
     /// File that keeps the last 16 KiB of flash between runs
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
@@ -121,8 +125,16 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut terminal = Terminal::open(args.pty.as_deref())?;
     println!("pty {}", terminal.path().display());
     let seconds = args.seconds.unwrap_or(f64::INFINITY);
-    let result = terminal.serve(&mut board, seconds, args.speed == Speed::Realtime, print_log);
-    print_log(&mut board);
+    let mut log = args.log.as_deref().map(LogFile::open).transpose()?;
+    let mut attend = |board: &mut Board| {
+        if let Some(log) = &mut log {
+            log.append(board);
+        }
+        print_log(board);
+    };
+    let result = terminal.serve(&mut board, seconds, args.speed == Speed::Realtime, &mut attend);
+    attend(&mut board);
+    log.map_or(Ok(()), LogFile::finish)?;
     if let Some(path) = &args.flash {
         keep_flash(path, &board)?;
     }
@@ -135,6 +147,34 @@ fn print_log(board: &mut Board) {
     }
     // Nobody looks at the tick's edges here, and a long run makes many.
     board.take_edges(TICK_MARKER);
+}
+
+/// Where the bytes of the log go.
+struct LogFile {
+    path: PathBuf,
+    file: std::fs::File,
+    written: std::io::Result<()>,
+}
+
+impl LogFile {
+    fn open(path: &Path) -> Result<Self, Failure> {
+        let file = std::fs::File::options().create(true).append(true).open(path);
+        let file = file.map_err(|error| Failure::usage(format!("{}: {error}", path.display())))?;
+        Ok(Self { path: path.to_owned(), file, written: Ok(()) })
+    }
+
+    /// The board runs on where the file takes no more.
+    fn append(&mut self, board: &mut Board) {
+        let bytes = board.take_log_bytes();
+        if self.written.is_ok() {
+            self.written = self.file.write_all(&bytes);
+        }
+    }
+
+    fn finish(self) -> Result<(), Failure> {
+        let path = self.path.display();
+        self.written.map_err(|error| Failure { text: format!("cannot write {path}: {error}"), status: 1 })
+    }
 }
 
 fn keep_flash(path: &Path, board: &Board) -> Result<(), Failure> {

@@ -31,6 +31,8 @@ pub(crate) const RAM: Region = Region { start: 0x2000_0000, size: 128 << 10 };
 pub(crate) const RAM_WITHOUT_CCM: Region = Region { start: 0x2000_0000, size: 96 << 10 };
 /// CCM SRAM at its own address.
 pub(crate) const CCM: Region = Region { start: 0x1000_0000, size: 32 << 10 };
+/// Boot loader of the manufacturer.
+pub(crate) const BOOT_LOADER: Region = Region { start: 0x1fff_0000, size: 28 << 10 };
 /// Page with unique id, flash size and factory calibration.
 pub(crate) const SYSTEM_MEMORY: Region = Region { start: 0x1fff_7000, size: 4 << 10 };
 /// Peripherals on AHB and APB.

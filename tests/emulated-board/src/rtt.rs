@@ -64,6 +64,8 @@ pub(crate) struct Rtt {
     /// Bytes behind the last complete frame.
     partial: Vec<u8>,
     lines: Vec<LogLine>,
+    /// Everything fetched that nobody took yet.
+    bytes: Vec<u8>,
 }
 
 impl Rtt {
@@ -72,7 +74,7 @@ impl Rtt {
         let Some(control_block) = control_block else { return Ok(None) };
         let table = Table::parse(elf)
             .map_err(|error| BoardError::Image(format!("its defmt table cannot be read: {error}")))?;
-        Ok(Some(Self { control_block, table, partial: Vec::new(), lines: Vec::new() }))
+        Ok(Some(Self { control_block, table, partial: Vec::new(), lines: Vec::new(), bytes: Vec::new() }))
     }
 
     /// Lines so far.
@@ -83,6 +85,11 @@ impl Rtt {
     /// Takes out the lines so far.
     pub(crate) fn take_lines(&mut self) -> Vec<LogLine> {
         std::mem::take(&mut self.lines)
+    }
+
+    /// Takes out the bytes so far, as a debug probe gets them.
+    pub(crate) fn take_bytes(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.bytes)
     }
 
     /// A frame that was cut by a reset is lost.
@@ -116,6 +123,7 @@ impl Rtt {
         }
         while fetched != written {
             self.partial.push(content[fetched as usize]);
+            self.bytes.push(content[fetched as usize]);
             fetched = (fetched + 1) % size;
         }
         write(memory, self.control_block + BUFFER + 12, &written.to_le_bytes());

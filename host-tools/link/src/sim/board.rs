@@ -10,7 +10,7 @@ use bowden_control::snapshot::Snapshot;
 use bowden_control::tick::{Command, Queues};
 use bowden_control::tick_config;
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
-use bowden_link::message::{Boot, Chip, Provocation};
+use bowden_link::message::{Boot, Chip, Provocation, Refusal};
 use bowden_link::{Answer, Fault, FromBoard, Request, Sample, State};
 use virtual_bench::BenchError;
 
@@ -193,6 +193,8 @@ impl SimBoard {
                             self.suffer(provocation);
                             FromBoard::Done
                         }
+                        // There is none, and no flash to write.
+                        Reply::BootLoader => FromBoard::Refused(Refusal::Storage),
                     };
                     self.say(Some(request.sequence), answer);
                 }

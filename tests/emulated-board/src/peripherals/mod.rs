@@ -5,6 +5,7 @@
 
 pub(crate) mod adc;
 pub(crate) mod advanced_timer;
+pub(crate) mod boot_loader;
 pub(crate) mod crs;
 pub(crate) mod dbgmcu;
 pub(crate) mod dma;

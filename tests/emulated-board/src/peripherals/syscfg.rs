@@ -7,6 +7,7 @@ use crate::error::{Refusal, only};
 /// The SYSCFG.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Syscfg {
+    memrmp: u32,
     exticr: [u32; 4],
     cfgr1: u32,
     cfgr2: u32,
@@ -36,7 +37,8 @@ impl Syscfg {
     /// Value of the register at `offset`.
     pub(crate) fn read(&self, offset: u32) -> Result<u32, Refusal> {
         Ok(match offset {
-            0x00 | 0x18 => 0,
+            0x00 => self.memrmp,
+            0x18 => 0,
             0x1c => self.cfgr2,
             0x04 => self.cfgr1,
             0x08..=0x14 => self.exticr[(offset as usize - 8) / 4],
@@ -47,7 +49,11 @@ impl Syscfg {
     /// Writes the register at `offset`.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
         match offset {
-            0x00 => only("MEMRMP", value, 0)?,
+            0x00 => {
+                // What is seen at address 0: the flash or, for the boot loader, the system memory. Nothing here reads there.
+                only("MEMRMP", value, 1)?;
+                self.memrmp = value;
+            }
             0x04 => {
                 // BOOSTEN and ANASWVDD act on analog switches at low supply only.
                 only("CFGR1", value, 0x300)?;

@@ -1,6 +1,7 @@
 //! The release images on the emulated board.
 
 mod boot;
+mod boot_loader;
 mod bridge;
 mod clock;
 mod closed_loop;
@@ -13,6 +14,7 @@ mod failures;
 mod faults;
 mod flash;
 mod load;
+mod log;
 mod modes;
 mod monitor;
 mod moved_sheath;

@@ -1,0 +1,129 @@
+//! `bowden log`: the log of the firmware, with time and level.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use bowden_core::outcome::{Failure, Outcome};
+use bowden_core::output;
+use bowden_host_link::firmware_log::{LogDecoder, LogImage, LogLine};
+
+use super::print;
+use crate::interrupt;
+
+/// Bytes that are read at once.
+const READ_BYTES: usize = 1 << 16;
+
+/// Lowest level that is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+enum Level {
+    Trace,
+    Debug,
+    Info,
+    Warn,
+    Error,
+}
+
+/// Arguments of `bowden log`.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "A line is the time since the board's start in seconds, the level, and the words. LOG holds the bytes of the first RTT \
+                  channel as they came from a debug probe or from `bowden-board run --log`."
+)]
+pub struct LogArguments {
+    /// ELF that the firmware was flashed from
+    elf: PathBuf,
+    /// File of logged bytes; `-` for standard input
+    log: PathBuf,
+    /// Lowest level to print; lines without one are always printed
+    #[arg(long, value_enum, default_value = "trace")]
+    level: Level,
+    /// Print JSON: one object a line
+    #[arg(long)]
+    json: bool,
+}
+
+impl LogArguments {
+    /// Decodes and prints as the bytes come.
+    ///
+    /// # Errors
+    /// Exit status 2: a file that cannot be read, an ELF without log, or the ELF of another firmware.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        interrupt::catch()?;
+        let image = load_image(&self.elf)?;
+        let mut decoder = LogDecoder::new(&image);
+        let name = self.log.display();
+        each_piece(&self.log, |bytes| {
+            decoder.take(bytes)?.iter().filter(|line| self.shows(line)).try_for_each(|line| self.print(line))
+        })?;
+        let mut outcome = Outcome::done();
+        outcome.extend(decoder.finish()?.map(|note| format!("{name}: {note}")));
+        Ok(outcome)
+    }
+
+    fn shows(&self, line: &LogLine) -> bool {
+        let level = match line.level {
+            None => return true,
+            Some("trace") => Level::Trace,
+            Some("debug") => Level::Debug,
+            Some("info") => Level::Info,
+            Some("warn") => Level::Warn,
+            Some(_) => Level::Error,
+        };
+        level >= self.level
+    }
+
+    fn print(&self, line: &LogLine) -> Result<(), Failure> {
+        if !self.json {
+            return print(&format!("{line}\n"));
+        }
+        let text = serde_json::to_string(line).map_err(|error| {
+            Failure::failed(format!("standard output: no JSON: {error}; please report this"))
+        })?;
+        print(&(text + "\n"))
+    }
+}
+
+/// The words of a firmware's log.
+///
+/// # Errors
+/// Exit status 2: the file cannot be read, or see [`LogImage::parse`].
+pub(super) fn load_image(elf: &Path) -> Result<LogImage, Failure> {
+    let name = elf.display().to_string();
+    let bytes = fs::read(elf).map_err(|error| {
+        Failure::bad_input(format!("{name}: {}; name the firmware's ELF", output::describe(&error)))
+    })?;
+    LogImage::parse(&name, &bytes)
+}
+
+/// Hands the bytes of a log on, piece by piece, until its end or Ctrl-C.
+///
+/// # Errors
+/// Exit status 2, if it cannot be read; what `take` says.
+pub(super) fn each_piece(
+    log: &Path,
+    mut take: impl FnMut(&[u8]) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let refuse = |error: &io::Error| {
+        Failure::bad_input(format!(
+            "{}: {}; name a file of logged bytes",
+            log.display(),
+            output::describe(error)
+        ))
+    };
+    let mut input: Box<dyn Read> = if log == Path::new("-") {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(File::open(log).map_err(|error| refuse(&error))?)
+    };
+    let mut buffer = vec![0; READ_BYTES];
+    while !interrupt::requested() {
+        match input.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(length) => take(&buffer[..length])?,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(refuse(&error)),
+        }
+    }
+    Ok(())
+}
