@@ -48,6 +48,8 @@ enum Command {
     Recover(crate::commands::recover::RecoverArguments),
     /// Simulate a rig with what went into a recording
     Replay(ReplayArguments),
+    /// Compute the control ticks of a raw recording again and compare every output with the board's, bit for bit
+    ReplayControl(crate::commands::replay_control::ReplayControlArguments),
     /// Recalibrate the parameters of a rig to recordings
     Fit(FitArguments),
     /// Simulate a rig from a reference: controller, motor, joint and sensors
@@ -114,6 +116,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Info(arguments) => arguments.run(),
         Command::Recover(arguments) => arguments.run(),
         Command::Replay(arguments) => under_way(cli, "replaying", || arguments.run()),
+        Command::ReplayControl(arguments) => under_way(cli, "replaying", || arguments.run()),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Simulate(arguments) => under_way(cli, "simulating", || arguments.run()),
         Command::Effect(arguments) => arguments.run(),

@@ -19,6 +19,7 @@ mod port;
 pub mod record;
 pub mod recover;
 pub mod replay;
+pub mod replay_control;
 pub mod send;
 pub mod shell;
 pub mod simulate;

@@ -4,9 +4,12 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use bowden_control::correction::ripple_table::RippleTable;
 use bowden_control::parameters::Parameters;
-use bowden_control::service::{Identity, ParameterStore, Port, Reply, Service, StoreError, View};
+use bowden_control::service::{
+    Identity, ParameterStore, Port, Reply, Service, StoreError, TelemetryMode, View,
+};
 use bowden_control::tick::Command;
 use bowden_link::message::{Boot, Chip, Provocation};
+use bowden_link::sample::Order;
 use bowden_link::{Accumulator, Fault, FaultRecord, FromBoard, Request, Sample, State};
 use embassy_futures::select::{Either, select};
 use embassy_futures::yield_now;
@@ -81,6 +84,8 @@ pub struct Host {
 /// The tick, as the service reaches it.
 struct Reach {
     ends: HostEnds,
+    /// What raw telemetry names the commands of now by.
+    order: Order,
     state: State,
     fault: Option<FaultRecord>,
     /// No tick runs: this is the fault, for good.
@@ -89,7 +94,7 @@ struct Reach {
 
 impl Port for Reach {
     fn command(&mut self, command: Command) -> bool {
-        self.ends.commands.enqueue(command).is_ok()
+        self.ends.commands.enqueue((self.order, command)).is_ok()
     }
 
     fn stream_free(&self) -> usize {
@@ -173,7 +178,7 @@ impl Host {
             got: f32::from(chip.restarts),
             limit: f32::from(Chip::SAFE_RESTARTS),
         });
-        let mut reach = Reach { ends, state: State::Off, fault: None, locked };
+        let mut reach = Reach { ends, order: Order::Stop, state: State::Off, fault: None, locked };
         let one_bank = chip.flash_banks != Chip::EXPECTED.flash_banks;
         let broken = if one_bank {
             Some(Fault::FlashBanks)
@@ -230,6 +235,7 @@ impl Host {
     async fn answer(&mut self, request: &Request) {
         retained::host_is_there();
         self.reach.listen();
+        self.reach.order = Order::Request(request.sequence);
         let answer = match self.service.handle(request, now_ms(), &mut self.reach) {
             Reply::Say(answer) => answer,
             Reply::Store => {
@@ -306,9 +312,10 @@ pub async fn run(mut host: Host, mut port: Receiver<'static, UsbDriver>) {
         } else {
             if !connected || !port.dtr() {
                 host.service.disconnected();
-                tick::set_telemetry(false);
+                tick::set_telemetry(TelemetryMode::Off);
             }
             host.reach.listen();
+            host.reach.order = Order::Stop;
             host.service.supervise(now_ms(), &mut host.reach);
         }
         count_round();

@@ -11,19 +11,22 @@ use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU16, AtomicU32, 
 
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
+use bowden_control::service::TelemetryMode;
 use bowden_control::tick::{Command, Inbox, TickInput};
 use bowden_control::tick_config;
+use bowden_link::sample::{Order, WordRaw};
 use bowden_link::{Fault, Limits, State};
 use cortex_m::peripheral::DWT;
 use embassy_stm32::gpio::Output;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use heapless::spsc::Producer;
 use static_cell::StaticCell;
 
 use crate::analog::{Analog, Codes};
 use crate::bridge::Bridge;
 use crate::clock::CORE_HZ;
-use crate::queues::TickEnds;
+use crate::queues::{Given, TickEnds};
 use crate::{encoders, retained};
 
 /// What the tick tells of itself; every value has one writer, the tick.
@@ -43,8 +46,8 @@ static TOLD: Told = Told {
     lost: AtomicU32::new(0),
 };
 
-/// Somebody wants the samples.
-static TELEMETRY: AtomicBool = AtomicBool::new(false);
+/// Who wants the samples, as a number of [`TelemetryMode`].
+static TELEMETRY: AtomicU8 = AtomicU8::new(0);
 
 /// Time between two ticks.
 static PERIOD_NS: AtomicU32 = AtomicU32::new(0);
@@ -70,24 +73,33 @@ struct Orders<'t> {
     ends: &'t mut TickEnds,
     late_permille: Option<u32>,
     supply_low: bool,
+    /// The one that was taken up.
+    order: Order,
+    /// The point that was taken out.
+    point_raw: Option<i32>,
 }
 
 impl Inbox for Orders<'_> {
     fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
         if core::mem::take(&mut self.supply_low) {
+            self.order = Order::Stop;
             return Some(act(&Command::Trip(Fault::ProcessorSupply, 0, 1.0, 0.0)));
         }
         if let Some(permille) = self.late_permille.take() {
+            self.order = Order::Stop;
             let periods = permille as f32 * 1e-3;
             return Some(act(&Command::Trip(Fault::TickOverrun, 0, periods, 1.0)));
         }
-        let done = act(self.ends.commands.peek()?);
+        let (order, command) = self.ends.commands.peek()?;
+        self.order = *order;
+        let done = act(command);
         self.ends.commands.dequeue();
         Some(done)
     }
 
     fn stream_point(&mut self) -> Option<i32> {
-        self.ends.stream.dequeue()
+        self.point_raw = self.ends.stream.dequeue();
+        self.point_raw
     }
 }
 
@@ -115,8 +127,10 @@ impl Tick {
         let input = TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault };
         let number = self.controller.tick_count();
         let late_permille = self.late_permille.take();
-        let mut orders = Orders { ends: &mut self.ends, late_permille, supply_low };
+        let mut orders =
+            Orders { ends: &mut self.ends, late_permille, supply_low, order: Order::None, point_raw: None };
         let output = self.controller.tick(&input, &mut orders);
+        let (order, point_raw) = (orders.order, orders.point_raw);
         self.bridge.set(output.duty_raw, output.driver_on, output.bridge_on);
         let ring = &retained::memory().snapshot;
         ring.push(number, &output.sample);
@@ -124,10 +138,18 @@ impl Tick {
             ring.freeze();
             // There is room: a second fault needs an order of the host, which empties the queue.
             let _ = self.ends.faults.enqueue(record);
+            // Nobody empties it while raw telemetry is off; then nobody asks either.
+            let _ = self.ends.told_faults.enqueue(record);
         } else if output.sample.state != State::Fault && ring.is_frozen() {
             ring.clear();
         }
-        if TELEMETRY.load(Ordering::Relaxed) && self.ends.samples.enqueue((number, output.sample)).is_err() {
+        let wanted = TELEMETRY.load(Ordering::Relaxed);
+        // In this order, so that no sample comes without what went into it.
+        let is_handed_on = (wanted != TelemetryMode::Raw as u8
+            || give(&mut self.ends.given, number, &input, order, point_raw))
+            && (wanted == TelemetryMode::Off as u8
+                || self.ends.samples.enqueue((number, output.sample)).is_ok());
+        if !is_handed_on {
             TOLD.lost.store(TOLD.lost.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         }
         TOLD.state.store(output.sample.state as u8, Ordering::Relaxed);
@@ -149,6 +171,19 @@ impl Tick {
         }
         self.marker.set_low();
     }
+}
+
+/// Hands what went into a tick to telemetry; `false` if there is no room.
+#[inline(never)]
+fn give(
+    given: &mut Producer<'static, (u32, Given)>,
+    number: u32,
+    input: &TickInput,
+    order: Order,
+    point_raw: Option<i32>,
+) -> bool {
+    let words = input.encoder.map(|word| WordRaw::new(word.frame_raw, word.sequence, word.bus_error));
+    given.enqueue((number, Given { words, point_raw, order, bridge_fault: input.bridge_fault })).is_ok()
 }
 
 /// Starts the ticks. The parameters were checked when they were loaded.
@@ -185,13 +220,17 @@ pub fn stay_off() {
 }
 
 /// Lets the tick hand its samples to telemetry.
-pub fn set_telemetry(wanted: bool) {
-    TELEMETRY.store(wanted, Ordering::Relaxed);
+pub fn set_telemetry(wanted: TelemetryMode) {
+    TELEMETRY.store(wanted as u8, Ordering::Relaxed);
 }
 
-/// Whether the tick hands its samples to telemetry.
-pub fn telemetry() -> bool {
-    TELEMETRY.load(Ordering::Relaxed)
+/// What the tick hands to telemetry.
+pub fn telemetry() -> TelemetryMode {
+    match TELEMETRY.load(Ordering::Relaxed) {
+        0 => TelemetryMode::Off,
+        1 => TelemetryMode::Samples,
+        _ => TelemetryMode::Raw,
+    }
 }
 
 /// Keeps the time between two ticks, for those who ask.

@@ -190,8 +190,48 @@ impl Controller {
                 self.table = *table;
                 None
             }
+            Command::Reset => {
+                if self.supervisor.state() == State::Off {
+                    self.reset();
+                }
+                None
+            }
             &Command::Trip(fault, channel, got, limit) => Some(Detection { fault, channel, got, limit }),
         }
+    }
+
+    /// The state behind [`Controller::new`], but for what [`Command::Reset`] keeps.
+    #[inline(never)]
+    fn reset(&mut self) {
+        self.supervisor = Supervisor::default();
+        self.encoders.iter_mut().for_each(EncoderChannel::reset);
+        self.stuck = StuckWatch::default();
+        self.tensions = TensionChannels::default();
+        self.supply = Supply::default();
+        self.observer = Observer::default();
+        self.sheaths = SheathObserver::default();
+        self.reference = ReferenceState::default();
+        self.waiting = None;
+        self.starts = false;
+        self.compensator = CompensatorState::default();
+        self.lead = Lead::default();
+        self.loops = Loops::default();
+        self.sheath = SheathEstimate::default();
+        self.limits = Limits(0);
+    }
+
+    /// A joint in the state that [`Command::Reset`] leaves, to follow the ticks behind it: `ticks` were done before,
+    /// `positions_counts` are those of the encoders, none where no frame ever came.
+    #[must_use]
+    pub fn resumed(
+        config: TickConfig,
+        table: Option<RippleTable>,
+        ticks: u32,
+        positions_counts: [Option<i32>; 2],
+    ) -> Self {
+        let encoders = positions_counts
+            .map(|position| position.map_or_else(EncoderChannel::default, EncoderChannel::at));
+        Self { encoders, table, ticks, ..Self::new(config) }
     }
 
     fn sense(&mut self, input: &TickInput, limits: &mut Limits) -> Readings {

@@ -44,3 +44,16 @@ pub mod tension;
 pub mod tick;
 
 pub use parameters::{reference_config, tick_config};
+
+/// Digest of the sources of this crate and of `bowden-link`: equal digests compute equal outputs of equal inputs.
+pub const SOURCE_DIGEST: [u8; 8] = u64_from_text(env!("BOWDEN_CONTROL_DIGEST")).to_be_bytes();
+
+/// Number in decimal digits, which the build script wrote.
+const fn u64_from_text(text: &str) -> u64 {
+    let (digits, mut place, mut number) = (text.as_bytes(), 0, 0);
+    while place < digits.len() {
+        number = 10 * number + (digits[place] - b'0') as u64;
+        place += 1;
+    }
+    number
+}

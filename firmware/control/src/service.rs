@@ -24,7 +24,7 @@ use crate::tick::Command;
 use crate::tick_config;
 use shelf::Shelf;
 
-pub use batcher::Batcher;
+pub use batcher::{Batcher, RawBatcher};
 pub use flash_map::StoreError;
 pub use store::ParameterStore;
 
@@ -70,6 +70,19 @@ pub trait Port {
     fn adopt(&mut self, parameters: &Parameters);
 }
 
+/// Telemetry that a host wants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum TelemetryMode {
+    /// None.
+    #[default]
+    Off = 0,
+    /// The samples.
+    Samples = 1,
+    /// Samples with all that went into them.
+    Raw = 2,
+}
+
 /// Who the board is.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
@@ -112,7 +125,7 @@ pub struct Service {
     parameters: Parameters,
     shelf: Shelf,
     panic_text: String<PANIC_TEXT>,
-    telemetry: bool,
+    telemetry: TelemetryMode,
     heard_ms: u32,
     bad_frames: u32,
     /// Number of the request whose reference points were taken last.
@@ -137,7 +150,7 @@ impl Service {
             parameters,
             shelf: Shelf::new(&Ok(None)),
             panic_text: kept,
-            telemetry: false,
+            telemetry: TelemetryMode::Off,
             heard_ms: 0,
             bad_frames: 0,
             streamed: None,
@@ -169,8 +182,8 @@ impl Service {
         &self.parameters
     }
 
-    /// Whether the host wants telemetry.
-    pub const fn telemetry(&self) -> bool {
+    /// The telemetry that the host wants.
+    pub const fn telemetry(&self) -> TelemetryMode {
         self.telemetry
     }
 
@@ -181,7 +194,7 @@ impl Service {
 
     /// The link is gone; nobody listens to telemetry.
     pub const fn disconnected(&mut self) {
-        self.telemetry = false;
+        self.telemetry = TelemetryMode::Off;
     }
 
     /// Answer to [`Reply::Store`].
@@ -217,9 +230,14 @@ impl Service {
             ToBoard::SetReference(reference) => self.refer(*reference, port),
             ToBoard::StreamPoints(points) => self.stream(request.sequence, points, port),
             ToBoard::Telemetry(on) => {
-                self.telemetry = *on;
+                self.telemetry = if *on { TelemetryMode::Samples } else { TelemetryMode::Off };
                 Ok(FromBoard::Done)
             }
+            ToBoard::RawTelemetry => {
+                self.telemetry = TelemetryMode::Raw;
+                Ok(FromBoard::Done)
+            }
+            ToBoard::ResetControl => self.reset(port),
             ToBoard::ReadStatus => Ok(FromBoard::Status(self.status(port))),
             ToBoard::ReadSnapshot(index) => port
                 .snapshot(*index)
@@ -266,6 +284,7 @@ impl Service {
             firmware: cut(self.identity.firmware),
             board: cut(self.identity.board),
             revision: cut(self.identity.revision),
+            control: crate::SOURCE_DIGEST,
             serial: cut(self.identity.serial),
             parameters: Parameters::COUNT,
             boot: self.identity.boot,
@@ -311,6 +330,18 @@ impl Service {
         let done = send(port, Command::Configure(config))?;
         port.adopt(&parameters);
         self.parameters = parameters;
+        Ok(done)
+    }
+
+    /// The control law begins anew; a reference that waits for a run is forgotten with the rest.
+    fn reset(&mut self, port: &mut impl Port) -> Result<FromBoard, Refusal> {
+        match port.view().state {
+            State::Off => {}
+            state => return Err(Refusal::WrongState(state)),
+        }
+        let done = send(port, Command::Reset)?;
+        self.waiting = None;
+        self.mode = None;
         Ok(done)
     }
 
@@ -408,6 +439,7 @@ const fn answered_in_safe_mode(message: &ToBoard) -> bool {
             | ToBoard::Alive
             | ToBoard::ReadParameter(_)
             | ToBoard::Telemetry(_)
+            | ToBoard::RawTelemetry
             | ToBoard::ReadStatus
             | ToBoard::ReadSnapshot(_)
             | ToBoard::ReadPanicText

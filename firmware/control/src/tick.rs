@@ -61,6 +61,9 @@ pub enum Command {
     Table(Option<RippleTable>),
     /// Follow this reference, from the present one on, smoothly.
     SetReference(ReferenceConfig),
+    /// Begin anew, as behind power-on, but for configuration, ripple table, count of ticks and the positions of the encoders; ignored
+    /// unless off.
+    Reset,
     /// Stop: something outside the tick went wrong. Fault, channel as in [`FaultRecord::channel`], what was measured,
     /// what is allowed. Acts in every state; the first fault is kept.
     Trip(Fault, u8, f32, f32),

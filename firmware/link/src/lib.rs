@@ -23,12 +23,12 @@ pub mod sample;
 pub use codes::{Fault, FaultRecord, Limit, Limits, State};
 pub use frame::{Accumulator, FrameError, decode, encode};
 pub use message::{Answer, FromBoard, Request, ToBoard};
-pub use sample::{Batch, Sample};
+pub use sample::{Batch, Inputs, RawBatch, RawTick, Sample};
 
 use postcard_schema::key::Key;
 
 /// Version of the protocol: counts changes that the schema cannot see, such as the meaning of a number.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// Hash over the shape of all messages of both directions.
 pub const SCHEMA: [u8; 8] = Key::for_path::<(Request, Answer)>("bowden-link").to_bytes();

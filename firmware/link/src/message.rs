@@ -7,7 +7,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::codes::{FaultRecord, Limits, State};
-use crate::sample::{Batch, Sample};
+use crate::sample::{Batch, RawBatch, Sample};
 
 /// Reference points that one message carries at most.
 pub const STREAM_LENGTH: usize = 32;
@@ -64,7 +64,7 @@ pub enum ToBoard {
     SetReference(Reference),
     /// Appends to the stream of references.
     StreamPoints(Vec<f32, STREAM_LENGTH>),
-    /// Switches telemetry.
+    /// Switches telemetry; off ends [`ToBoard::RawTelemetry`] as well.
     Telemetry(bool),
     /// Asks for the [`Status`].
     ReadStatus,
@@ -91,6 +91,11 @@ pub enum ToBoard {
     ClearTable,
     /// Leaves the firmware for the processor's own boot loader, which takes a new image over USB; with the bridge off only.
     EnterBootLoader,
+    /// Switches telemetry on, every tick with all that went into it.
+    RawTelemetry,
+    /// Brings the control law into the state behind power-on, but for parameters, ripple table, the count of ticks and the positions
+    /// of the encoders; in state off only. From the tick that takes this up, raw telemetry says all that the outputs follow from.
+    ResetControl,
 }
 
 /// What the board says.
@@ -125,6 +130,8 @@ pub enum FromBoard {
     Table(TableReport),
     /// Points of the ripple table, as in [`TableHead::full_scale_nm`].
     TablePoints(Vec<i16, TABLE_CHUNK>),
+    /// Complete control ticks.
+    RawTelemetry(RawBatch),
 }
 
 /// What a ripple table says beside its points.
@@ -164,6 +171,8 @@ pub struct Greeting {
     pub board: String<24>,
     /// Commit that the firmware was built from, with `+` behind it if files differed from it.
     pub revision: String<16>,
+    /// Digest of the sources of the control law: equal digests compute equal outputs.
+    pub control: [u8; 8],
     /// Serial number of the processor, hexadecimal, as USB tells it; empty where there is none.
     pub serial: String<24>,
     /// Number of parameters.

@@ -8,20 +8,22 @@ use bowden_core::outcome::Failure;
 use bowden_core::output;
 use bowden_core::progress::{Progress, Quiet};
 use bowden_core::recording::{DurableFile, END_GROUP, Format, Metadata};
-use bowden_link::message::Mode;
+use bowden_link::message::{Mode, TableReport};
 
 use super::conversion::Conversion;
 use super::course::Course;
 use super::error::{CommsError, LinkError};
 use super::evidence::{self, Origin};
 use super::parameters::ParameterSet;
+use super::raw::OrderBook;
 use super::recorder::{Form, Recorder, Tally, tick_time_s};
 use super::replug::Replug;
 use super::rig_file::{self, Weight};
+use super::ripple_table;
 use super::session::{RunEnd, RunTick, Session, Stop};
 
 /// Name under which an MCAP file keeps firmware version and parameters.
-const METADATA: &str = "bowden.parameters";
+pub(super) const METADATA: &str = "bowden.parameters";
 
 /// Steps of the progress of a run of known length.
 pub const PROGRESS_STEPS: u64 = 100;
@@ -56,6 +58,33 @@ impl Capture<'_> {
     /// # Errors
     /// When the medium refuses, or the board lacks a parameter that samples are converted with.
     pub fn recorder(&self, session: &Session) -> Result<Recorder, Failure> {
+        self.recorder_with(session, None, self.metadata(session))
+    }
+
+    /// The same, with all that goes into the ticks.
+    ///
+    /// # Errors
+    /// As [`Capture::recorder`], or no answer.
+    pub(super) fn raw_recorder(
+        &self,
+        session: &mut Session,
+        orders: &OrderBook,
+    ) -> Result<Recorder, Failure> {
+        let mut metadata = self.metadata(session);
+        if let TableReport::Whole(head) = session.client().ripple_table()? {
+            let table = ripple_table::download(session.client(), head)?;
+            let record = evidence::hexadecimal(&table.to_record());
+            metadata.extend(evidence::TABLE_GROUP, [("record".to_owned(), record)]);
+        }
+        self.recorder_with(session, Some(orders.clone()), metadata)
+    }
+
+    fn recorder_with(
+        &self,
+        session: &Session,
+        orders: Option<OrderBook>,
+        metadata: Metadata,
+    ) -> Result<Recorder, Failure> {
         let parameters = session.parameters();
         let beside = match self.format {
             Format::Mcap | Format::Parquet => Vec::new(),
@@ -67,7 +96,8 @@ impl Capture<'_> {
             conversion,
             mode: self.mode,
             every: self.every,
-            metadata: self.metadata(session),
+            orders,
+            metadata,
             beside,
             metadata_file: Metadata::file_beside(self.out),
         };
@@ -140,14 +170,7 @@ impl Capture<'_> {
             end = session.observe(stop, &mut self.sink(&mut recorder, &mut shown, &Quiet));
             gaps.push(last);
         }
-        let how = match &end {
-            Ok(RunEnd::Complete) => "complete".to_owned(),
-            Ok(RunEnd::Interrupted) => "stopped by the user".to_owned(),
-            Ok(RunEnd::Fault(fault)) => fault.to_string(),
-            Ok(RunEnd::Left(state)) => format!("the board went to state {state}"),
-            Err(error) => error.to_string(),
-        };
-        let mut known = evidence::end(recorder.tally(), &how);
+        let mut known = evidence::end(recorder.tally(), &words(&end));
         if let Some((name, load)) = self.rig {
             let bus_v = recorder.tally().bus_v.unwrap_or_default();
             let text = rig_file::text(name, session.parameters(), bus_v, load)?;
@@ -181,6 +204,17 @@ impl Capture<'_> {
         let mut metadata = evidence::of_board(greeting, port, self.origin, self.mode, self.every);
         metadata.extend(METADATA, session.parameters().metadata());
         metadata
+    }
+}
+
+/// How a run ended, in words.
+pub(super) fn words(end: &Result<RunEnd, LinkError>) -> String {
+    match end {
+        Ok(RunEnd::Complete) => "complete".to_owned(),
+        Ok(RunEnd::Interrupted) => "stopped by the user".to_owned(),
+        Ok(RunEnd::Fault(fault)) => fault.to_string(),
+        Ok(RunEnd::Left(state)) => format!("the board went to state {state}"),
+        Err(error) => error.to_string(),
     }
 }
 

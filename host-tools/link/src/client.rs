@@ -18,11 +18,15 @@ use bowden_link::message::{
     Goal, Greeting, Parameter, Provocation, Reference, Refusal, STREAM_LENGTH, Status, TABLE_CHUNK,
     TableReport,
 };
-use bowden_link::{Answer, Batch, FromBoard, PROTOCOL_VERSION, Request, SCHEMA, Sample, State, ToBoard};
+use bowden_link::{
+    Answer, Batch, FromBoard, PROTOCOL_VERSION, RawBatch, Request, SCHEMA, Sample, State, ToBoard,
+};
 
 use super::error::{CommsError, LinkError};
 use super::hub::{Hub, Live};
 use super::losses::{Losses, Place};
+use super::raw::{Given, OrderBook};
+use super::session::RunTick;
 use super::transport::{Gone, Transport};
 
 /// How often a request is sent before the board counts as silent, unless [`Client::hurry`] says more often.
@@ -38,12 +42,27 @@ pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(1500);
 const READ_LENGTH: usize = 4096;
 
 /// A batch of telemetry with its place in time.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Telemetry {
     /// Tick of the first sample, counted without wrapping.
     pub first_tick: u64,
     /// What the board sent.
     pub batch: Batch,
+    /// What went into each tick, with raw telemetry; otherwise empty.
+    pub given: Vec<Given>,
+}
+
+impl Telemetry {
+    /// Its ticks, one by one.
+    pub fn ticks(&self) -> impl Iterator<Item = RunTick> + '_ {
+        let period_ns = self.batch.period_ns;
+        (self.first_tick..).zip(&self.batch.samples).enumerate().map(move |(place, (tick, sample))| RunTick {
+            tick,
+            period_ns,
+            sample: *sample,
+            given: self.given.get(place).copied(),
+        })
+    }
 }
 
 /// A board that has greeted.
@@ -67,6 +86,8 @@ struct Wire {
     listening: bool,
     /// Where telemetry is published as well.
     hub: Option<Hub>,
+    /// Telemetry is raw, and orders to the tick are noted here.
+    orders: Option<OrderBook>,
     /// Added to the board's count of ticks, after a start of the board that the host counts through.
     tick_offset: u64,
     losses: Losses,
@@ -92,6 +113,7 @@ impl Client {
             telemetry: VecDeque::new(),
             listening: false,
             hub: None,
+            orders: None,
             tick_offset: 0,
             losses: Losses::default(),
             restarted: None,
@@ -102,6 +124,7 @@ impl Client {
             firmware: heapless::String::new(),
             board: heapless::String::new(),
             revision: heapless::String::new(),
+            control: [0; 8],
             serial: heapless::String::new(),
             parameters: 0,
             boot: bowden_link::message::Boot::Power,
@@ -210,6 +233,19 @@ impl Client {
     /// From now on hands telemetry to the readers of a hub as well.
     pub fn publish_to(&mut self, hub: Hub) {
         self.wire.hub = Some(hub);
+    }
+
+    /// From now on asks for raw telemetry, and notes in `orders` what is sent that a tick may take up.
+    pub fn note_orders(&mut self, orders: OrderBook) {
+        self.wire.orders = Some(orders);
+    }
+
+    /// Brings the control law into a known state, see [`ToBoard::ResetControl`].
+    ///
+    /// # Errors
+    /// [`Refusal::WrongState`] unless off, or no answer.
+    pub fn reset_control(&mut self) -> Result<(), LinkError> {
+        self.order("to reset the control law", ToBoard::ResetControl)
     }
 
     /// The oldest batch that was not taken yet.
@@ -407,7 +443,8 @@ impl Client {
             self.wire.telemetry.clear();
             self.wire.losses.pause();
         }
-        self.order("telemetry", ToBoard::Telemetry(on))
+        let raw = on && self.wire.orders.is_some();
+        self.order("telemetry", if raw { ToBoard::RawTelemetry } else { ToBoard::Telemetry(on) })
     }
 
     /// A sample of the snapshot with its tick, 0 the oldest.
@@ -499,6 +536,9 @@ impl Client {
     }
 
     fn send(&mut self, request: &Request) -> Result<(), LinkError> {
+        if let Some(orders) = &self.wire.orders {
+            orders.note(request);
+        }
         let mut buffer = [0; FRAME_LENGTH];
         let frame = encode(request, &mut buffer)
             .map_err(|error| CommsError::Broken { port: self.port.clone(), reason: error.to_string() })?
@@ -560,16 +600,9 @@ impl Wire {
             };
             self.losses.frame(frame.sequence);
             match frame.message {
-                FromBoard::Telemetry(_) if !self.listening => {}
-                FromBoard::Telemetry(batch) => match self.losses.batch(&batch) {
-                    Place::At(first_tick) => {
-                        self.keep(Telemetry { first_tick: first_tick + self.tick_offset, batch });
-                    }
-                    Place::Late => {}
-                    Place::Restarted { expected } => {
-                        self.restarted = Some((batch.first_tick, expected.wrapping_sub(1)));
-                    }
-                },
+                FromBoard::Telemetry(_) | FromBoard::RawTelemetry(_) if !self.listening => {}
+                FromBoard::Telemetry(batch) => self.sort(batch, Vec::new()),
+                FromBoard::RawTelemetry(raw) => self.sort_raw(&raw),
                 message => {
                     self.answers += 1;
                     if number.is_some() && frame.answers == number {
@@ -579,6 +612,29 @@ impl Wire {
             }
         }
         wanted
+    }
+
+    /// Puts a batch into its place in time.
+    fn sort(&mut self, batch: Batch, given: Vec<Given>) {
+        match self.losses.batch(&batch) {
+            Place::At(first_tick) => {
+                self.keep(Telemetry { first_tick: first_tick + self.tick_offset, batch, given });
+            }
+            Place::Late => {}
+            Place::Restarted { expected } => {
+                self.restarted = Some((batch.first_tick, expected.wrapping_sub(1)));
+            }
+        }
+    }
+
+    fn sort_raw(&mut self, raw: &RawBatch) {
+        let RawBatch { first_tick, period_ns, lost, ticks } = raw;
+        let samples = ticks.iter().map(|tick| tick.sample).collect();
+        let batch = Batch { first_tick: *first_tick, period_ns: *period_ns, lost: *lost, samples };
+        // Raw telemetry that another program left on has orders that nobody here knows.
+        let orders = self.orders.clone().unwrap_or_default();
+        let given = ticks.iter().map(|tick| orders.given(tick.inputs)).collect();
+        self.sort(batch, given);
     }
 
     fn keep(&mut self, telemetry: Telemetry) {

@@ -25,6 +25,18 @@ pub struct Origin {
     pub plan: Option<(String, String)>,
 }
 
+/// Entry that says which control law made the outputs: [`Greeting::control`].
+pub const CONTROL: &str = "control";
+
+/// Group of the ripple table that the board had; absent without one.
+pub const TABLE_GROUP: &str = "bowden.ripple_table";
+
+/// Bytes in hexadecimal digits.
+#[must_use]
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Both clocks of the host.
 ///
 /// The monotonic one has no date and never jumps: within one `boot`, it tells the time between two recordings.
@@ -51,6 +63,7 @@ pub fn of_board(greeting: &Greeting, port: &str, origin: &Origin, mode: Mode, ev
         ("tool_revision", origin.tool_revision.clone()),
         ("firmware", greeting.firmware.as_str().to_owned()),
         ("firmware_revision", greeting.revision.as_str().to_owned()),
+        (CONTROL, hexadecimal(&greeting.control)),
         ("board", greeting.board.as_str().to_owned()),
         ("board_serial", greeting.serial.as_str().to_owned()),
         ("port", port.to_owned()),

@@ -11,7 +11,7 @@ use super::client::Telemetry;
 use super::losses::Losses;
 
 /// A batch of samples and how the link stands after it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Live {
     /// The samples.
     pub telemetry: Telemetry,
@@ -51,7 +51,7 @@ struct Waiting {
 }
 
 /// What a reader gets.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Next {
     /// The oldest batch that it has not taken.
     Batch(Arc<Live>),
@@ -155,7 +155,7 @@ mod tests {
     fn live(first_tick: u32) -> Live {
         let samples = std::iter::repeat_n(Sample::default(), 24).collect();
         let batch = Batch { first_tick, period_ns: 100_000, lost: 0, samples };
-        let telemetry = Telemetry { first_tick: first_tick.into(), batch };
+        let telemetry = Telemetry { first_tick: first_tick.into(), batch, given: Vec::new() };
         Live { telemetry, losses: Losses::default(), heard_bytes: 0 }
     }
 

@@ -17,6 +17,7 @@
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
 //! | [`evidence`] | what a recording says of itself |
+//! | [`raw`], [`raw_capture`], [`replay_control`] | all that goes into a tick, and the tick computed again |
 //! | [`firmware_log`] | the firmware's own log, and a recording made of it |
 
 #![forbid(unsafe_code)]
@@ -36,7 +37,10 @@ pub mod losses;
 pub mod operator;
 pub mod paced;
 pub mod parameters;
+pub mod raw;
+pub mod raw_capture;
 pub mod recorder;
+pub mod replay_control;
 pub mod replug;
 pub mod rig_file;
 pub mod ripple_table;

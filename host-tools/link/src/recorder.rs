@@ -10,12 +10,13 @@ use std::thread::{self, JoinHandle};
 
 use bowden_core::outcome::Failure;
 use bowden_core::output;
-use bowden_core::recording::{DurableFile, DurableWriter, Format, Metadata, Saved};
+use bowden_core::recording::{Cell, DurableFile, DurableWriter, Format, Metadata, Saved};
 use bowden_link::message::Mode;
 
 use super::conversion::{Conversion, columns};
 use super::evidence;
 use super::losses::Losses;
+use super::raw::{self, OrderBook};
 use super::session::RunTick;
 
 /// Rows that may wait for the medium: 6.5 s at 10 kHz, 5 MB.
@@ -45,6 +46,8 @@ pub struct Form {
     pub mode: Mode,
     /// Only every N-th tick is written, beginning with the first.
     pub every: u64,
+    /// Orders, where what went into a tick is written as well.
+    pub orders: Option<OrderBook>,
     /// What stands before the rows; the time of the first one is added.
     pub metadata: Metadata,
     /// Files that stand beside the recording, with their text.
@@ -108,7 +111,7 @@ impl Recorder {
     /// Takes a tick; `false` once the medium has refused, which [`Recorder::finish`] tells.
     #[must_use]
     pub fn tick(&mut self, tick: &RunTick) -> bool {
-        let RunTick { tick: number, period_ns, sample } = *tick;
+        let RunTick { tick: number, period_ns, sample, .. } = *tick;
         let tally = &mut self.tally;
         tally.period_ns = period_ns;
         let first = match tally.ticks {
@@ -191,12 +194,26 @@ fn write(
     if let Some(path) = &form.metadata_file {
         output::write_text(path, &metadata.to_toml()).map_err(nothing)?;
     }
-    let mut rows = file.begin(form.format, &columns(Some(form.mode)), &metadata).map_err(nothing)?;
+    let mut columns = columns(Some(form.mode));
+    if form.orders.is_some() {
+        columns.extend(raw::columns());
+    }
+    let mut rows = file.begin(form.format, &columns, &metadata).map_err(nothing)?;
     let mut next = Some(first);
     loop {
         let written = match next {
-            Some(RunTick { tick, period_ns, sample }) => {
-                rows.row(tick_time_s(tick, period_ns), form.conversion.cells(&sample, Some(form.mode)))
+            Some(RunTick { tick, period_ns, sample, given }) => {
+                let cells = form.conversion.cells(&sample, Some(form.mode));
+                let t_s = tick_time_s(tick, period_ns);
+                match &form.orders {
+                    None => rows.row(t_s, cells),
+                    Some(orders) => {
+                        let write = |given: &[Cell]| {
+                            rows.row(t_s, cells.map(as_short_lived).chain(given.iter().copied()))
+                        };
+                        orders.cells(&given.unwrap_or(raw::Given::NOTHING), write)
+                    }
+                }
             }
             None => rows.save(),
         };
@@ -211,6 +228,11 @@ fn write(
             Err(RecvTimeoutError::Disconnected) => return Ok(Some((rows, metadata))),
         };
     }
+}
+
+/// A cell beside others that borrow.
+fn as_short_lived<'c>(cell: Cell<'static>) -> Cell<'c> {
+    cell
 }
 
 impl Tally {

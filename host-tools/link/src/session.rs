@@ -16,6 +16,7 @@ use super::course::{Course, Track};
 use super::error::{CommsError, LinkError};
 use super::hub::Hub;
 use super::parameters::ParameterSet;
+use super::raw::Given;
 
 /// Ticks after a confirmed order until the state shows that it was taken up.
 const SETTLED_TICKS: u32 = 20;
@@ -76,6 +77,8 @@ pub struct RunTick {
     pub period_ns: u32,
     /// Signals.
     pub sample: Sample,
+    /// What went into them, with raw telemetry.
+    pub given: Option<Given>,
 }
 
 impl Session {
@@ -127,6 +130,15 @@ impl Session {
         self.watched = true;
         self.passed = (self.client.now(), self.client.status()?.tick);
         self.client.switch_telemetry(true)
+    }
+
+    /// Ends [`Session::watch`].
+    ///
+    /// # Errors
+    /// When the board does not answer.
+    pub fn unwatch(&mut self) -> Result<(), LinkError> {
+        self.watched = false;
+        self.client.switch_telemetry(false)
     }
 
     /// Waits up to `timeout` for something from the board, without an order to it.
@@ -206,9 +218,8 @@ impl Session {
         loop {
             self.client.listen(LISTEN_INTERVAL.min(self.alive_interval))?;
             while let Some(telemetry) = self.client.telemetry() {
-                let period_ns = telemetry.batch.period_ns;
-                for (tick, sample) in (telemetry.first_tick..).zip(&telemetry.batch.samples) {
-                    if sink(&RunTick { tick, period_ns, sample: *sample }).is_break() {
+                for tick in telemetry.ticks() {
+                    if sink(&tick).is_break() {
                         return Ok(RunEnd::Complete);
                     }
                 }
@@ -317,8 +328,9 @@ impl Session {
             while let Some(telemetry) = self.client.telemetry() {
                 heard = self.client.now();
                 last_tick = telemetry.batch.first_tick;
-                for (tick, sample) in (telemetry.first_tick..).zip(&telemetry.batch.samples) {
-                    let running = sample.state == State::Run;
+                for tick in telemetry.ticks() {
+                    let state = tick.sample.state;
+                    let running = state == State::Run;
                     if running && !begun {
                         begun = true;
                         if let Some(feed) = &mut feed {
@@ -326,18 +338,17 @@ impl Session {
                         }
                     }
                     if !begun {
-                        let waited = (tick as u32).wrapping_sub(asked.tick);
+                        let waited = (tick.tick as u32).wrapping_sub(asked.tick);
                         if waited > SETTLED_TICKS && waited < u32::MAX / 2 {
-                            return self.left(sample.state);
+                            return self.left(state);
                         }
                         continue;
                     }
-                    let tick = RunTick { tick, period_ns: telemetry.batch.period_ns, sample: *sample };
                     if sink(&tick).is_break() {
                         return Ok(RunEnd::Complete);
                     }
                     if !running {
-                        return self.left(sample.state);
+                        return self.left(state);
                     }
                 }
             }

@@ -9,6 +9,7 @@ use bowden_core::recording::{Format, Metadata};
 use bowden_host_link::capture::{Capture, PROGRESS_STEPS, sidecar};
 use bowden_host_link::course::Course;
 use bowden_host_link::evidence::Origin;
+use bowden_host_link::raw_capture;
 use bowden_host_link::recorder::Tally;
 use bowden_host_link::rig_file::{self, Weight};
 use bowden_host_link::session::{RunEnd, Session};
@@ -45,6 +46,9 @@ pub struct RecordArguments {
     /// Set the parameters that a file names first, as `bowden params load` does
     #[arg(long, value_name = "FILE.toml")]
     parameters: Option<PathBuf>,
+    /// Record all that goes into every tick as well, from a known start in off on, for `bowden replay-control`
+    #[arg(long, conflicts_with_all = ["every", "replug"])]
+    raw: bool,
     /// Record every N-th control tick
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     every: u64,
@@ -98,13 +102,15 @@ impl RecordArguments {
         let mut session = Session::new(client)?;
         let replug = self.port.replug(self.replug);
         self.course.check(&course, &session.parameters().control())?;
-        progress.stage("self test and pretension check", 0);
-        session.ready(stop)?;
-        if self.home {
-            progress.stage("homing", 0);
-            session.home(stop)?;
+        if !self.raw {
+            progress.stage("self test and pretension check", 0);
+            session.ready(stop)?;
+            if self.home {
+                progress.stage("homing", 0);
+                session.home(stop)?;
+            }
+            progress.stage("recording", if seconds.is_some() { PROGRESS_STEPS } else { 0 });
         }
-        progress.stage("recording", if seconds.is_some() { PROGRESS_STEPS } else { 0 });
         let name = self.out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
         let origin =
             Origin { note: self.note.clone(), reference: Some(self.course.words()), ..super::origin() };
@@ -118,7 +124,11 @@ impl RecordArguments {
             rig: self.rig.is_some().then_some((&name, self.load)),
             replug: Some(&replug),
         };
-        let (tally, end) = capture.run(&mut session, &course, stop, progress)?;
+        let (tally, end) = if self.raw {
+            raw_capture::run(&capture, &mut session, &course, self.home, stop, progress)?
+        } else {
+            capture.run(&mut session, &course, stop, progress)?
+        };
 
         let parameters = session.parameters();
         if let Some(path) = &self.rig {

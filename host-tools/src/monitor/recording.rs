@@ -11,7 +11,6 @@ use bowden_host_link::capture::sidecar;
 use bowden_host_link::evidence;
 use bowden_host_link::hub::{Next, Reader};
 use bowden_host_link::recorder::{Recorder, Tally};
-use bowden_host_link::session::RunTick;
 
 /// Longest wait for a batch.
 const WAKE: Duration = Duration::from_millis(100);
@@ -58,9 +57,8 @@ pub fn write(
     while goes_on {
         match reader.next(WAKE) {
             Next::Batch(live) => {
-                let period_ns = live.telemetry.batch.period_ns;
-                for (tick, sample) in (live.telemetry.first_tick..).zip(&live.telemetry.batch.samples) {
-                    goes_on &= recorder.tick(&RunTick { tick, period_ns, sample: *sample });
+                for tick in live.telemetry.ticks() {
+                    goes_on &= recorder.tick(&tick);
                 }
                 progress.say(format!("{shown}: {} rows", recorder.tally().rows));
             }

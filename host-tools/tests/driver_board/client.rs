@@ -102,12 +102,12 @@ fn another_version_is_told_with_what_to_do() {
     let (client, _) = connect(Fake::new(Mishaps { protocol_version: Some(0), ..Mishaps::default() }));
     assert_eq!(
         message(&client.err().unwrap()),
-        "fake: firmware 9.8.7 speaks protocol version 0, expected 1; flash the firmware that belongs to this bowden"
+        "fake: firmware 9.8.7 speaks protocol version 0, expected 2; flash the firmware that belongs to this bowden"
     );
-    let (client, _) = connect(Fake::new(Mishaps { protocol_version: Some(2), ..Mishaps::default() }));
+    let (client, _) = connect(Fake::new(Mishaps { protocol_version: Some(3), ..Mishaps::default() }));
     assert_eq!(
         message(&client.err().unwrap()),
-        "fake: firmware 9.8.7 speaks protocol version 2, expected 1; use the bowden that belongs to this firmware"
+        "fake: firmware 9.8.7 speaks protocol version 3, expected 2; use the bowden that belongs to this firmware"
     );
     let (client, _) =
         connect(Fake::new(Mishaps { schema: Some([0, 1, 2, 3, 4, 5, 6, 7]), ..Mishaps::default() }));

@@ -330,6 +330,7 @@ impl Fake {
                     firmware: "9.8.7".try_into().unwrap(),
                     board: "fake".try_into().unwrap(),
                     revision: "0123456789ab".try_into().unwrap(),
+                    control: *b"\x01\x23\x45\x67\x89\xab\xcd\xef",
                     serial: "0042002A".try_into().unwrap(),
                     parameters: PARAMETERS.len() as u16,
                     boot: Boot::Watchdog,
@@ -428,7 +429,9 @@ impl Fake {
             | ToBoard::Provoke(_)
             | ToBoard::WriteTablePoints { .. }
             | ToBoard::ClearTable
-            | ToBoard::EnterBootLoader => {}
+            | ToBoard::EnterBootLoader
+            | ToBoard::RawTelemetry
+            | ToBoard::ResetControl => {}
         }
         Ok(FromBoard::Done)
     }

@@ -15,6 +15,7 @@ mod mishaps;
 mod monitor;
 mod ports;
 mod pseudo_terminal;
+mod replay_control;
 mod replug;
 mod ripple_table;
 #[path = "../common/screen.rs"]

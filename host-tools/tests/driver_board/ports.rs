@@ -70,7 +70,7 @@ fn a_board_of_another_version_is_not_talked_to() {
     let terminal = Terminal::new(Fake::new(Mishaps { protocol_version: Some(7), ..Mishaps::default() }));
     let port = terminal.port();
     let expected = format!(
-        "bowden: {port}: firmware 9.8.7 speaks protocol version 7, expected 1; use the bowden that belongs to this firmware\n"
+        "bowden: {port}: firmware 9.8.7 speaks protocol version 7, expected 2; use the bowden that belongs to this firmware\n"
     );
     let folder = tempfile::tempdir().unwrap();
     let refused = terminal.bowden(folder.path(), "record", &["--out", "a.csv", "--seconds", "1"]);

@@ -84,6 +84,19 @@ enum Bad {
 }
 
 impl EncoderChannel {
+    /// A channel that goes on from a position, counts, and knows of no frame before.
+    #[must_use]
+    pub fn at(position_counts: i32) -> Self {
+        let first = CountRaw::from_low_bits(position_counts as u32);
+        Self { position: Some(MultiTurn::starting_near(first, position_counts)), ..Self::default() }
+    }
+
+    /// Forgets all but the position.
+    pub const fn reset(&mut self) {
+        self.sequence = None;
+        self.bad = 0;
+    }
+
     /// Takes the word of this tick. A frame that fails a check, is missing, or jumps is repaired with the last good
     /// position; [`EncoderConfig::bad_frames`] of them in a row are a fault, named after the last one.
     ///

@@ -1,6 +1,6 @@
 //! Gathers samples of consecutive ticks into batches.
 
-use bowden_link::{Batch, Sample};
+use bowden_link::{Batch, RawBatch, RawTick, Sample};
 
 /// Gathers samples; a gap between two ticks closes the batch before it, so that every batch is gapless.
 #[derive(Debug, Default)]
@@ -29,6 +29,34 @@ impl Batcher {
     /// What is gathered so far, if anything.
     pub fn take(&mut self) -> Option<Batch> {
         if self.batch.samples.is_empty() { None } else { Some(core::mem::take(&mut self.batch)) }
+    }
+}
+
+/// The same for complete ticks.
+#[derive(Debug, Default)]
+pub struct RawBatcher {
+    batch: RawBatch,
+}
+
+impl RawBatcher {
+    /// As [`Batcher::push`].
+    pub fn push(&mut self, tick: u32, complete: RawTick, period_ns: u32, lost: u32) -> Option<RawBatch> {
+        let follows = self.batch.first_tick.wrapping_add(self.batch.ticks.len() as u32) == tick;
+        let fits = follows && self.batch.period_ns == period_ns && !self.batch.ticks.is_full();
+        let closed = if self.batch.ticks.is_empty() || fits { None } else { self.take() };
+        if self.batch.ticks.is_empty() {
+            self.batch.first_tick = tick;
+            self.batch.period_ns = period_ns;
+        }
+        self.batch.lost = lost;
+        // There is room: a full batch was closed above.
+        let _ = self.batch.ticks.push(complete);
+        closed.or_else(|| if self.batch.ticks.is_full() { self.take() } else { None })
+    }
+
+    /// What is gathered so far, if anything.
+    pub fn take(&mut self) -> Option<RawBatch> {
+        if self.batch.ticks.is_empty() { None } else { Some(core::mem::take(&mut self.batch)) }
     }
 }
 

@@ -5,13 +5,14 @@ use std::time::Duration;
 
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
-use bowden_control::service::{Batcher, Identity, Port, Reply, Service, View};
+use bowden_control::service::{Batcher, Identity, Port, RawBatcher, Reply, Service, TelemetryMode, View};
 use bowden_control::snapshot::Snapshot;
-use bowden_control::tick::{Command, Queues};
+use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
 use bowden_control::tick_config;
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
 use bowden_link::message::{Boot, Chip, Provocation, Refusal};
-use bowden_link::{Answer, Fault, FromBoard, Request, Sample, State};
+use bowden_link::sample::{Order, WordRaw};
+use bowden_link::{Answer, Fault, FromBoard, Inputs, RawTick, Request, Sample, State};
 use virtual_bench::BenchError;
 
 use super::concealed::Concealed;
@@ -32,9 +33,33 @@ const SUPERVISION: Duration = Duration::from_millis(5);
 /// Duty 1.
 const FULL_DUTY: f64 = 32_767.0;
 
+/// Orders on their way to the tick, with what raw telemetry names them by.
+#[derive(Default)]
+struct Numbered {
+    commands: VecDeque<(Order, Command)>,
+    points: VecDeque<i32>,
+    /// Order and point that this tick has taken.
+    taken: (Order, Option<i32>),
+}
+
+impl Inbox for Numbered {
+    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
+        let (order, command) = self.commands.pop_front()?;
+        self.taken.0 = order;
+        Some(act(&command))
+    }
+
+    fn stream_point(&mut self) -> Option<i32> {
+        self.taken.1 = self.points.pop_front();
+        self.taken.1
+    }
+}
+
 /// What the services reach of the tick.
 struct Reach<'b> {
-    queues: &'b mut Queues,
+    queues: &'b mut Numbered,
+    /// What raw telemetry names commands by.
+    order: Order,
     snapshot: &'b Snapshot,
     view: View,
     divider: &'b mut u16,
@@ -44,7 +69,7 @@ impl Port for Reach<'_> {
     fn command(&mut self, command: Command) -> bool {
         let room = self.queues.commands.len() < COMMANDS;
         if room {
-            self.queues.commands.push_back(command);
+            self.queues.commands.push_back((self.order, command));
         }
         room
     }
@@ -78,9 +103,10 @@ impl Port for Reach<'_> {
 pub(super) struct SimBoard {
     controller: Controller,
     service: Service,
-    queues: Queues,
+    queues: Numbered,
     snapshot: Snapshot,
     batcher: Batcher,
+    raw: RawBatcher,
     joint: SimJoint,
     divider: u16,
     now_ns: u64,
@@ -114,9 +140,10 @@ impl SimBoard {
             controller: Controller::new(config),
             divider: parameters.rate_divider(),
             service: Service::new(identity, parameters, ""),
-            queues: Queues::default(),
+            queues: Numbered::default(),
             snapshot: Snapshot::new(),
             batcher: Batcher::default(),
+            raw: RawBatcher::default(),
             joint,
             now_ns: 0,
             supervised: Duration::ZERO,
@@ -149,6 +176,7 @@ impl SimBoard {
     pub(super) fn tick(&mut self) {
         let input = self.joint.measure();
         let tick = self.controller.tick_count();
+        self.queues.taken = (Order::None, None);
         let output = self.controller.tick(&input, &mut self.queues);
         self.snapshot.push(tick, &output.sample);
         if output.tripped.is_some() {
@@ -157,15 +185,7 @@ impl SimBoard {
             self.snapshot.thaw();
         }
         let period_ns = u64::from(self.divider) * PWM_PERIOD_NS;
-        if self.service.telemetry() {
-            let batch = self.batcher.push(tick, output.sample, period_ns as u32, 0);
-            if let Some(batch) = batch {
-                self.say(None, FromBoard::Telemetry(batch));
-            }
-        } else {
-            // A batch that was begun for a host that does not want it any more.
-            self.batcher.take();
-        }
+        self.tell(tick, &input, &output, period_ns as u32);
         let duty = f64::from(output.duty_raw) / FULL_DUTY;
         self.joint.advance(duty, output.bridge_on, period_ns as f64 * 1e-9);
         self.now_ns += period_ns;
@@ -174,6 +194,39 @@ impl SimBoard {
             let now_ms = self.now_ms();
             let (service, mut reach) = self.parts();
             service.supervise(now_ms, &mut reach);
+        }
+    }
+
+    /// Adds a tick to the telemetry that is wanted. A batch that was begun for a host that does not want it any more is dropped.
+    fn tell(&mut self, tick: u32, input: &TickInput, output: &TickOutput, period_ns: u32) {
+        let mode = self.service.telemetry();
+        if mode != TelemetryMode::Samples {
+            self.batcher.take();
+        }
+        if mode != TelemetryMode::Raw {
+            self.raw.take();
+        }
+        let message = match mode {
+            TelemetryMode::Off => None,
+            TelemetryMode::Samples => {
+                self.batcher.push(tick, output.sample, period_ns, 0).map(FromBoard::Telemetry)
+            }
+            TelemetryMode::Raw => {
+                let word = |word: EncoderWord| WordRaw::new(word.frame_raw, word.sequence, word.bus_error);
+                let (order, point_raw) = self.queues.taken;
+                let inputs = Inputs {
+                    encoder_word_raw: input.encoder.map(word),
+                    bridge_fault: input.bridge_fault,
+                    order,
+                    point_raw,
+                    tripped: output.tripped,
+                };
+                let complete = RawTick { sample: output.sample, inputs };
+                self.raw.push(tick, complete, period_ns, 0).map(FromBoard::RawTelemetry)
+            }
+        };
+        if let Some(message) = message {
+            self.say(None, message);
         }
     }
 
@@ -186,6 +239,7 @@ impl SimBoard {
                 Some(Ok(request)) => {
                     let now_ms = self.now_ms();
                     let (service, mut reach) = self.parts();
+                    reach.order = Order::Request(request.sequence);
                     let answer = match service.handle(&request, now_ms, &mut reach) {
                         Reply::Say(answer) => answer,
                         Reply::Store => Service::stored(true),
@@ -210,7 +264,7 @@ impl SimBoard {
             Provocation::Hang => Fault::Watchdog,
             Provocation::LateTick => Fault::TickOverrun,
         };
-        self.queues.commands.push_back(Command::Trip(fault, 0, 1.0, 0.0));
+        self.queues.commands.push_back((Order::Stop, Command::Trip(fault, 0, 1.0, 0.0)));
     }
 
     fn now_ms(&self) -> u32 {
@@ -228,8 +282,13 @@ impl SimBoard {
             snapshot: self.snapshot.len() as u8,
             bus_errors: 0,
         };
-        let reach =
-            Reach { queues: &mut self.queues, snapshot: &self.snapshot, view, divider: &mut self.divider };
+        let reach = Reach {
+            queues: &mut self.queues,
+            order: Order::Stop,
+            snapshot: &self.snapshot,
+            view,
+            divider: &mut self.divider,
+        };
         (&mut self.service, reach)
     }
 

@@ -19,6 +19,7 @@ mod modes;
 mod monitor;
 mod moved_sheath;
 mod parameters;
+mod replay_control;
 mod ripple_table;
 #[path = "../../../../host-tools/tests/common/screen.rs"]
 #[expect(dead_code, reason = "another part of it is for the tests of the host tools")]
