@@ -58,6 +58,8 @@ enum Command {
     Effect(crate::commands::effect::EffectArguments),
     /// Run the joint on a driver board along a reference and record every control tick
     Record(crate::commands::record::RecordArguments),
+    /// Carry out a plan on a driver board: home, checks, motions, pauses; a recording each and a summary
+    Run(crate::commands::run::RunArguments),
     /// Show the joint on a driver board live, let it move by keys, and record meanwhile
     Monitor(crate::commands::monitor::MonitorArguments),
     /// Excite, diagnose, correct and verify the joint on a driver board, all in one
@@ -121,6 +123,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Simulate(arguments) => under_way(cli, "simulating", || arguments.run()),
         Command::Effect(arguments) => arguments.run(),
         Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Run(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Monitor(arguments) => arguments.run(),
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),

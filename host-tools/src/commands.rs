@@ -20,6 +20,7 @@ pub mod record;
 pub mod recover;
 pub mod replay;
 pub mod replay_control;
+pub mod run;
 pub mod send;
 pub mod shell;
 pub mod simulate;

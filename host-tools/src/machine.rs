@@ -6,8 +6,10 @@ use std::process::Command;
 
 use rustix::fs::{Access, access};
 
-/// Vendor of ST, and its debug probes (ST-LINK V2, V2-1, V3); the Nucleo board has one on it.
-const PROBE_VENDOR: u16 = 0x0483;
+/// Vendor of ST.
+pub const PROBE_VENDOR: u16 = 0x0483;
+
+/// Its debug probes (ST-LINK V2, V2-1, V3); the Nucleo board has one on it.
 const PROBES: [u16; 9] = [0x3744, 0x3748, 0x374b, 0x374d, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754];
 
 /// Where the operating system shows its devices.

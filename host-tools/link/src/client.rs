@@ -195,6 +195,11 @@ impl Client {
         &self.wire.losses
     }
 
+    /// Bytes that came since the port was opened.
+    pub fn heard_bytes(&self) -> u64 {
+        self.wire.heard_bytes
+    }
+
     /// Answers that came since the greeting.
     pub fn answers(&self) -> u64 {
         self.wire.answers

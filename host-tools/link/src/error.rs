@@ -1,5 +1,6 @@
 //! What can go wrong between host and board. Refusals are answers of a board that works; everything else is the way to it.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use bowden_core::outcome::Failure;
@@ -17,7 +18,7 @@ pub enum CommsError {
         /// What is wrong.
         reason: String,
         /// What to do.
-        next: &'static str,
+        next: Cow<'static, str>,
     },
     /// Nobody greets.
     #[error(

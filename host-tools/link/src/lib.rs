@@ -14,6 +14,7 @@
 //! | [`operator`] | a joint with somebody at the keys |
 //! | [`replug`] | a board that was unplugged and comes back |
 //! | [`course`] | what the joint is to follow |
+//! | [`bench_run`] | a bench run as a file |
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
 //! | [`evidence`] | what a recording says of itself |
@@ -22,6 +23,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bench_run;
 pub mod capture;
 pub mod client;
 pub mod conversion;

@@ -23,10 +23,17 @@ pub const USB_VENDOR: u16 = 0x1209;
 /// USB product of the board.
 pub const USB_PRODUCT: u16 = 0xb0d7;
 
-/// What lets a user open the port for good: a rule for the user at the machine and for the group that owns serial ports.
-const GRANT: &str = "grant it with echo 'SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"b0d7\", \
-                     GROUP=\"dialout\", MODE=\"0660\", TAG+=\"uaccess\"' | sudo tee -a /etc/udev/rules.d/70-bowden.rules \
-                     && sudo udevadm control --reload, then plug the board in again";
+/// Command that lets users open a USB device for good: a udev rule for the user at the machine and for the group that owns serial
+/// ports. Without a product it holds for all devices of the vendor.
+#[must_use]
+pub fn udev_rule(subsystem: &str, vendor: u16, product: Option<u16>) -> String {
+    let product =
+        product.map_or_else(String::new, |product| format!(", ATTRS{{idProduct}}==\"{product:04x}\""));
+    format!(
+        "echo 'SUBSYSTEM==\"{subsystem}\", ATTRS{{idVendor}}==\"{vendor:04x}\"{product}, GROUP=\"dialout\", MODE=\"0660\", \
+         TAG+=\"uaccess\"' | sudo tee -a /etc/udev/rules.d/70-bowden.rules && sudo udevadm control --reload, then plug it in again"
+    )
+}
 
 /// Rate that the port is set to, baud. USB takes no notice of it.
 const BAUD: u32 = 115_200;
@@ -136,25 +143,27 @@ impl Drop for SerialTransport {
 }
 
 fn open_error(path: &str, error: &serialport::Error) -> CommsError {
+    const ANOTHER: &str = "name one such as /dev/ttyACM0, or auto, or sim";
     let (reason, next) = match error.kind() {
         ErrorKind::Io(io::ErrorKind::NotFound) => {
-            ("there is no such port".to_owned(), "check the cable, or use --port auto")
+            ("there is no such port".to_owned(), "check the cable, or use --port auto".to_owned())
         }
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
-            ("this user may not open the port".to_owned(), GRANT)
+            let rule = udev_rule("tty", USB_VENDOR, Some(USB_PRODUCT));
+            ("this user may not open the port".to_owned(), format!("grant it with {rule}"))
         }
         ErrorKind::NoDevice if Path::new(path).exists() => {
-            (held(&holders(Path::new(path))), "close that one first")
+            (held(&holders(Path::new(path))), "close that one first".to_owned())
         }
         _ if std::fs::metadata(path).is_ok_and(|there| there.is_file() || there.is_dir()) => {
-            ("this is no serial port".to_owned(), "name one such as /dev/ttyACM0, or auto, or sim")
+            ("this is no serial port".to_owned(), ANOTHER.to_owned())
         }
         _ => (
             format!("cannot be opened as a serial port: {}", error.description.to_lowercase()),
-            "name one such as /dev/ttyACM0, or auto, or sim",
+            ANOTHER.to_owned(),
         ),
     };
-    CommsError::Open { port: path.to_owned(), reason, next }
+    CommsError::Open { port: path.to_owned(), reason, next: next.into() }
 }
 
 /// Who has a port open, in words. Programs of other users cannot be named.
@@ -206,7 +215,7 @@ fn board(port: &SerialPortInfo) -> Option<&UsbPortInfo> {
 
 fn refuse_to_find(number: Option<&str>, reason: String, next: &'static str) -> CommsError {
     let port = number.map_or_else(|| AUTO.to_owned(), |number| format!("{SERIAL}{number}"));
-    CommsError::Open { port, reason, next }
+    CommsError::Open { port, reason, next: next.into() }
 }
 
 fn choose(ports: &[SerialPortInfo], wanted: Option<&str>) -> Result<String, CommsError> {

@@ -39,7 +39,7 @@ impl SimTransport {
         let board = SimBoard::new(concealed).map_err(|error| CommsError::Open {
             port: super::SIM.to_owned(),
             reason: error.to_string(),
-            next: "conceal something else",
+            next: "conceal something else".into(),
         })?;
         Ok(Self { board })
     }

@@ -4,11 +4,11 @@ use std::fmt::Write;
 use std::time::Duration;
 
 use bowden_core::outcome::{Failure, Outcome};
-use bowden_host_link::serial::{USB_PRODUCT, USB_VENDOR};
+use bowden_host_link::serial::{USB_PRODUCT, USB_VENDOR, udev_rule};
 use serde::Serialize;
 
 use super::{print, print_json};
-use crate::machine::{Device, Machine, at_least, version_of};
+use crate::machine::{Device, Machine, PROBE_VENDOR, at_least, version_of};
 
 /// Time that a board gets for an answer, s.
 const TIMEOUT_S: f64 = 1.5;
@@ -142,7 +142,7 @@ fn probe(probes: &[Device]) -> Check {
             "probe",
             Grade::Wrong,
             format!("{} {}: this user may not open {}", first.product, first.serial, file.display()),
-            rule("usb", "0483", ""),
+            udev_rule("usb", PROBE_VENDOR, None),
         ),
         None => Check::new("probe", Grade::Ok, format!("{} {}", first.product, first.serial), ""),
     }
@@ -159,20 +159,12 @@ fn port(boards: &[Device]) -> Check {
     };
     if let Some(file) = first.forbidden() {
         let found = format!("this user may not open {}", file.display());
-        let product = format!(", ATTRS{{idProduct}}==\"{USB_PRODUCT:04x}\"");
-        return Check::new("port", Grade::Wrong, found, rule("tty", &format!("{USB_VENDOR:04x}"), &product));
+        let rule = udev_rule("tty", USB_VENDOR, Some(USB_PRODUCT));
+        return Check::new("port", Grade::Wrong, found, rule);
     }
     let names: Vec<String> =
         boards.iter().flat_map(|board| &board.files).map(|file| file.display().to_string()).collect();
     Check::new("port", Grade::Ok, format!("{}, serial number {}", names.join(", "), first.serial), "")
-}
-
-/// Command that lets this machine's users open a device.
-fn rule(subsystem: &str, vendor: &str, product: &str) -> String {
-    format!(
-        "echo 'SUBSYSTEM==\"{subsystem}\", ATTRS{{idVendor}}==\"{vendor}\"{product}, GROUP=\"dialout\", MODE=\"0660\", \
-         TAG+=\"uaccess\"' | sudo tee -a /etc/udev/rules.d/70-bowden.rules && sudo udevadm control --reload, then plug it in again"
-    )
 }
 
 fn board(port: &str) -> Check {

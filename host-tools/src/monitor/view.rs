@@ -159,20 +159,22 @@ impl Watch {
                     value(Signal::ThetaIn),
                     value(Signal::Error)
                 )));
+                let plain = |name: &str, signal: Signal| format!("{name} {:.2}", value(signal));
+                let signed =
+                    |name: &str, signal: Signal, digits: usize| format!("{name} {:+.digits$}", value(signal));
+                let tensions =
+                    [("f1", Signal::F1), ("f2", Signal::F2), ("f3", Signal::F3), ("f4", Signal::F4)];
                 lines.push(Line::raw(format!(
-                    "f1 {:.2}  f2 {:.2}  f3 {:.2}  f4 {:.2} N  torque in {:+.4} out {:+.4} N·m",
-                    value(Signal::F1),
-                    value(Signal::F2),
-                    value(Signal::F3),
-                    value(Signal::F4),
-                    value(Signal::TorqueIn),
-                    value(Signal::TorqueOut)
+                    "{} N  {} {} N·m",
+                    tensions.map(|(name, signal)| plain(name, signal)).join("  "),
+                    signed("torque in", Signal::TorqueIn, 4),
+                    signed("out", Signal::TorqueOut, 4)
                 )));
                 lines.push(Line::raw(format!(
-                    "duty {:+.3}  current {:+.3} A  bus {:.2} V",
-                    value(Signal::Duty),
-                    value(Signal::Current),
-                    value(Signal::Bus)
+                    "{}  {} A  {} V",
+                    signed("duty", Signal::Duty, 3),
+                    signed("current", Signal::Current, 3),
+                    plain("bus", Signal::Bus)
                 )));
                 let acting: Vec<&str> = Limit::ALL
                     .into_iter()

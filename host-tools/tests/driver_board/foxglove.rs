@@ -4,10 +4,12 @@ use std::collections::HashMap;
 use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
+use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, connect};
 
 use crate::bowden;
@@ -15,6 +17,9 @@ use crate::fake::Fake;
 use crate::mishaps::Mishaps;
 use crate::pseudo_terminal::Terminal;
 use crate::screen::Screen;
+
+/// Real time in which something has to come.
+const HANG_LIMIT: Duration = Duration::from_mins(10);
 
 /// Address that stands on the screen.
 fn address(screen: &mut Screen) -> String {
@@ -35,6 +40,11 @@ fn a_client_gets_the_live_samples_that_the_layout_shows() {
     // The protocol that Foxglove asks for.
     request.headers_mut().insert("Sec-WebSocket-Protocol", HeaderValue::from_static("foxglove.sdk.v1"));
     let (mut client, _) = connect(request).unwrap();
+    // A server that falls silent fails the test instead of holding it up for ever.
+    let MaybeTlsStream::Plain(stream) = client.get_mut() else {
+        panic!("a plain connection on the loopback")
+    };
+    stream.set_read_timeout(Some(HANG_LIMIT)).unwrap();
 
     let mut channels: HashMap<String, Value> = HashMap::new();
     while channels.len() < 2 {

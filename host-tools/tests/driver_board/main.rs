@@ -3,6 +3,7 @@
 //!
 //! No result depends on wall-clock time: see [`wires`] and [`pseudo_terminal`].
 
+mod bench_run;
 mod client;
 #[path = "../common/mod.rs"]
 mod common;

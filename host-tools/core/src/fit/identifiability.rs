@@ -118,11 +118,58 @@ impl Sensitivity {
         groups
     }
 
+    /// What the training data tell of relative changes of the parameters: the inverse covariance of their logarithms.
+    #[must_use]
+    pub fn information(&self) -> Information {
+        let columns = &self.columns;
+        Information {
+            names: columns.iter().map(|(name, _)| name.clone()).collect(),
+            matrix: columns.iter().map(|(_, a)| columns.iter().map(|(_, b)| dot(a, b)).collect()).collect(),
+        }
+    }
+
     /// Parameters that the predictions do not depend on as far as the data can show.
     #[must_use]
     pub fn unseen(&self) -> Vec<String> {
         let short = |(_, values): &&(String, Vec<f64>)| length(values) < SEEN_LENGTH;
         self.columns.iter().filter(short).map(|(name, _)| name.clone()).collect()
+    }
+}
+
+/// Fisher information of parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Information {
+    /// `section.name`.
+    pub names: Vec<String>,
+    /// Rows and columns in the order of the names.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+impl Information {
+    /// Logarithm of the determinant of a sum, with `before` on the diagonal: known of each parameter without any data. All are of the
+    /// same parameters.
+    ///
+    /// By Cholesky's factors, which exist for every `before` above 0.
+    pub fn log_determinant<'i>(all: impl IntoIterator<Item = &'i Self>, before: f64) -> f64 {
+        let mut sum: Vec<Vec<f64>> = Vec::new();
+        for Self { matrix, .. } in all {
+            sum.resize_with(matrix.len(), || vec![0.0; matrix.len()]);
+            sum.iter_mut().flatten().zip(matrix.iter().flatten()).for_each(|(sum, value)| *sum += value);
+        }
+        let mut logarithm = 0.0;
+        for row in 0..sum.len() {
+            for column in 0..=row {
+                let done = dot(&sum[row][..column], &sum[column][..column]);
+                if row == column {
+                    let pivot = sum[row][row] + before - done;
+                    logarithm += pivot.ln();
+                    sum[row][row] = pivot.sqrt();
+                } else {
+                    sum[row][column] = (sum[row][column] - done) / sum[column][column];
+                }
+            }
+        }
+        logarithm
     }
 }
 
@@ -203,6 +250,18 @@ mod tests {
     fn sensitivity(columns: &[(&str, [f64; 3])]) -> Sensitivity {
         let columns = columns.iter().map(|(name, values)| ((*name).to_owned(), values.to_vec())).collect();
         Sensitivity { columns }
+    }
+
+    #[test]
+    fn the_determinant_of_a_sum_is_that_by_hand() {
+        let of = |matrix: [[f64; 2]; 2]| Information {
+            names: vec!["a".to_owned(), "b".to_owned()],
+            matrix: matrix.map(|row| row.to_vec()).to_vec(),
+        };
+        // (3 + 1)(5 + 1) - 2·2 with 1 on the diagonal; of nothing 1.
+        let both = [of([[1.0, 2.0], [2.0, 4.0]]), of([[2.0, 0.0], [0.0, 1.0]])];
+        assert!((Information::log_determinant(&both, 1.0) - 20.0_f64.ln()).abs() < 1e-12);
+        assert_eq!(Information::log_determinant([], 1.0), 0.0);
     }
 
     #[test]

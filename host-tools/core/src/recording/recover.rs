@@ -77,7 +77,9 @@ pub fn recover(path: &Path, out: &Path) -> Result<Recovered, Failure> {
             }
             Ok(result) => {
                 let why = result.missing.first().map_or(String::new(), |line| format!(" ({line})"));
-                recovered = Err(Failure::bad_input(format!("{source}: no whole row is in the file{why}")));
+                recovered = Err(Failure::bad_input(format!(
+                    "{source}: no whole row is in the file{why}; recover another copy of it"
+                )));
                 Err(std::io::Error::other("no row"))
             }
             Err(sink::Stopped::Input(reason)) => {

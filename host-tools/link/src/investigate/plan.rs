@@ -276,15 +276,27 @@ impl Plan {
     }
 }
 
-/// What a run asks for, looked at over one period.
+/// What a run asks for.
 fn demand(run: &Run, parameters: &Parameters, reach: &Reach) -> Demand {
-    let unit = f64::from(run.amplitude_rad) / f64::from(ONE);
-    let offset = f64::from(run.offset_rad);
-    let at =
-        |point: u32| offset + unit * f64::from(form(run.shape, point.wrapping_mul(u32::MAX / POINTS + 1)));
+    demand_of_reference(run.reference(), parameters, reach)
+}
+
+/// What a reference of angles that the board makes asks for, looked at over one period.
+pub fn demand_of_reference(reference: Reference, parameters: &Parameters, reach: &Reach) -> Demand {
+    let (shape, amplitude, offset, frequency_hz) = match reference {
+        Reference::Generated { shape, amplitude, offset, frequency_hz } => {
+            (shape, amplitude, offset, frequency_hz)
+        }
+        // Something that stands has any shape without an amplitude.
+        Reference::Hold(offset) => (Shape::Sine, 0.0, offset, 1.0),
+        Reference::Stream => (Shape::Sine, 0.0, 0.0, 1.0),
+    };
+    let unit = f64::from(amplitude) / f64::from(ONE);
+    let offset = f64::from(offset);
+    let at = |point: u32| offset + unit * f64::from(form(shape, point.wrapping_mul(u32::MAX / POINTS + 1)));
     // The first and last two points close the period.
     let angles: Vec<f64> = (0..POINTS + 2).map(at).collect();
-    demand_of(&angles, 1.0 / (f64::from(run.frequency_hz) * f64::from(POINTS)), parameters, reach)
+    demand_of(&angles, 1.0 / (f64::from(frequency_hz) * f64::from(POINTS)), parameters, reach)
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ impl Concealed {
     /// bench under a board cannot have.
     pub fn parse(list: &str) -> Result<Self, CommsError> {
         let port = format!("{}:{list}", crate::SIM);
-        let refuse = |reason: String| CommsError::Open { port: port.clone(), reason, next: NEXT };
+        let refuse = |reason: String| CommsError::Open { port: port.clone(), reason, next: NEXT.into() };
         let mut seed = None;
         let mut wanted = Vec::new();
         for part in list.split(',').map(str::trim) {

@@ -137,7 +137,7 @@ impl<R: Read + Seek, W: Write + Seek> Scan<'_, R, W> {
         let mut at = magic;
         if self.bytes(0, magic)?.as_deref() != Some(mcap::MAGIC) {
             let Some(next) = self.find(0)? else {
-                return Err(Stopped::Input("neither its start nor a chunk of MCAP is in the file".into()));
+                return Err(Stopped::Input("neither its start nor a chunk of MCAP is in the file; give the file that was recorded, or one with the ending of its format".into()));
             };
             self.damaged(0, next);
             at = next;

@@ -72,7 +72,9 @@ impl<W: Write + Seek> Sink<W> {
     /// Sets the columns.
     pub fn header(&mut self, names: Vec<String>) -> Result<(), Stopped> {
         let Some(time) = names.iter().position(|name| name == TIME_ROLE) else {
-            return Err(Stopped::Input(format!("no column `{TIME_ROLE}` in the first whole row")));
+            return Err(Stopped::Input(format!(
+                "no column `{TIME_ROLE}` in the first whole row; name the time in seconds so, or recover a recording of this program"
+            )));
         };
         self.time = time;
         let columns: Vec<RowColumn> = names

@@ -1,0 +1,223 @@
+//! `bowden run PLAN.toml`: what it does, refuses, and how it goes on after a stop.
+
+use std::fs;
+use std::path::Path;
+
+use bowden_core::recording::{ReadOptions, Recording};
+use serde_json::Value;
+
+use crate::bowden;
+use crate::fake::Fake;
+use crate::mishaps::Mishaps;
+use crate::pseudo_terminal::Terminal;
+
+const PLAN: &str = r#"schema = "bowden-plan/1"
+name = "check"
+
+[limits]
+angle_rad = 0.4
+
+[[step]]
+kind = "pretension_check"
+
+[[step]]
+kind = "home"
+
+[[step]]
+kind = "pause"
+seconds = 0.5
+
+[[step]]
+kind = "follow"
+reference = "sine"
+amplitude = 0.2
+frequency_hz = 1.0
+seconds = 0.3
+repeat = 2
+
+[[step]]
+kind = "follow"
+reference = "hold"
+offset = 0.1
+seconds = 0.2
+every = 10
+"#;
+
+/// Runs a plan of the simulated board.
+fn run(folder: &Path, plan: &str, arguments: &[&str]) -> (i32, String, String) {
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    bowden(folder, &[&["run", "plan.toml", "--port", "sim", "--out", "out"], arguments].concat())
+}
+
+/// Names of the steps that the ledger has, and their rows.
+fn ledger(folder: &Path) -> Vec<(String, u64)> {
+    let text = fs::read_to_string(folder.join("out/run.json")).unwrap();
+    let ledger: Value = serde_json::from_str(&text).unwrap();
+    let done = ledger["done"].as_array().unwrap();
+    done.iter()
+        .map(|done| (done["name"].as_str().unwrap().to_owned(), done["rows"].as_u64().unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_plan_is_carried_out_with_a_recording_each_and_a_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, stdout, stderr) = run(folder.path(), PLAN, &[]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let expected = [
+        ("01-pretension-check", 0),
+        ("02-home", 0),
+        ("03-pause", 0),
+        ("04-sine-1", 3000),
+        ("05-sine-2", 3000),
+        ("06-hold", 200),
+    ];
+    let expected = expected.map(|(name, rows)| (name.to_owned(), rows));
+    assert_eq!(ledger(folder.path()), expected);
+    assert!(
+        stdout.starts_with("check: 6 steps done\n") && stdout.contains("3000 rows in 04-sine-1.mcap"),
+        "{stdout}"
+    );
+    assert_eq!(fs::read_to_string(folder.path().join("out/summary.txt")).unwrap(), stdout);
+    // Each recording says which step of which plan it is, and holds what the step asked for.
+    let recording =
+        Recording::load(&folder.path().join("out/05-sine-2.mcap"), &ReadOptions::default()).unwrap();
+    let entry = |name| recording.metadata().entry("bowden.recording", name);
+    assert_eq!((entry("plan"), entry("plan_step")), (Some(PLAN), Some("05-sine-2")));
+    assert!((recording.duration_s() - 0.2999).abs() < 1e-9, "{}", recording.duration_s());
+    // Once more: nothing is left to do, and nothing is recorded again.
+    let before = fs::read(folder.path().join("out/05-sine-2.mcap")).unwrap();
+    let (status, stdout, _) = run(folder.path(), PLAN, &[]);
+    assert!(
+        status == 0 && stdout.starts_with("check: 6 steps done, 6 of them before this start\n"),
+        "{stdout}"
+    );
+    assert_eq!(fs::read(folder.path().join("out/05-sine-2.mcap")).unwrap(), before);
+    // Another plan has no business there.
+    let (status, _, stderr) = run(folder.path(), &PLAN.replace("0.5", "0.6"), &[]);
+    assert_eq!(
+        (status, stderr.as_str()),
+        (2, "bowden: out/run.json: the run of another plan; choose another folder with --out\n")
+    );
+}
+
+#[test]
+fn a_run_that_a_fault_stopped_goes_on_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = "schema = \"bowden-plan/1\"\n[[step]]\nkind = \"home\"\n[[step]]\nkind = \"follow\"\nreference = \"hold\"\nseconds = 0.2\n";
+    fs::write(folder.path().join("plan.toml"), plan).unwrap();
+    let arguments = ["plan.toml", "--out", "out", "--format", "csv"];
+    let terminal = Terminal::new(Fake::new(Mishaps { slack_after: Some(500), ..Mishaps::default() }));
+    let (status, stdout, stderr) = terminal.bowden(folder.path(), "run", &arguments);
+    assert_eq!((status, stdout.as_str(), stderr.lines().count()), (1, "", 1), "{stderr}");
+    assert!(
+        stderr.contains("a tendon is slack") && stderr.contains("rows are kept in out/02-hold.stopped-1.csv"),
+        "{stderr}"
+    );
+    assert!(stderr.ends_with("1 of 2 steps are done; the same command goes on with 02-hold\n"), "{stderr}");
+    assert_eq!(ledger(folder.path()), [("01-home".to_owned(), 0)]);
+    let stopped =
+        Recording::load(&folder.path().join("out/02-hold.stopped-1.csv"), &ReadOptions::default()).unwrap();
+    assert!(
+        stopped.len() > 400
+            && stopped.metadata().entry("bowden.end", "end").is_some_and(|end| end.contains("slack"))
+    );
+    assert!(!folder.path().join("out/02-hold.csv").exists());
+    drop(terminal);
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    let (status, stdout, stderr) = terminal.bowden(folder.path(), "run", &arguments);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    assert!(stdout.starts_with("unnamed: 2 steps done, 1 of them before this start\n"), "{stdout}");
+    assert_eq!(ledger(folder.path())[1], ("02-hold".to_owned(), 2000));
+    assert!(folder.path().join("out/02-hold.stopped-1.csv").exists());
+}
+
+#[test]
+fn what_a_plan_may_not_ask_is_said_with_its_place_before_anything_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    let follow = "kind = \"follow\"\nreference = \"sine\"";
+    for (from, to, expected) in [
+        (
+            "angle_rad = 0.4",
+            "angle_rad = 3.5",
+            "plan.toml:5:13: limits.angle_rad: 3.5 rad is above the board's ",
+        ),
+        (
+            "angle_rad = 0.4",
+            "torque_nm = 90",
+            "plan.toml:5:13: limits.torque_nm: 90 N·m is above the board's ",
+        ),
+        (
+            "amplitude = 0.2",
+            "amplitude = 0.45",
+            "plan.toml:17:1: sine of 0.45 rad at 1 Hz around 0 rad, position, 0.3 s: angle of 0.4500 rad is above the plan's limit of 0.4 rad",
+        ),
+        (
+            "frequency_hz = 1.0",
+            "frequency_hz = 40",
+            "plan.toml:17:1: sine of 0.2 rad at 40 Hz around 0 rad, position, 0.3 s: the joint cannot do it: ",
+        ),
+        (
+            "kind = \"home\"",
+            "kind = \"hone\"",
+            "plan.toml:11:8: unknown kind `hone` of a step; did you mean `home`?",
+        ),
+        (
+            follow,
+            "kind = \"follow\"\nreference = \"sinus\"",
+            "plan.toml:19:13: unknown reference `sinus`; did you mean `sine`?",
+        ),
+        (
+            "frequency_hz = 1.0\n",
+            "",
+            "plan.toml:17:1: [step] lacks `frequency_hz` (periods a second); add it",
+        ),
+        (
+            "bowden-plan/1",
+            "bowden-plan/2",
+            "plan.toml:1:10: schema: got `bowden-plan/2`, expected `bowden-plan/1`",
+        ),
+    ] {
+        assert!(PLAN.contains(from));
+        let (status, stdout, stderr) = run(folder.path(), &PLAN.replacen(from, to, 1), &[]);
+        assert_eq!((status, stdout.as_str(), stderr.lines().count()), (2, "", 1), "{stderr}");
+        assert!(stderr.starts_with(&format!("bowden: {expected}")), "{stderr}\n{expected}");
+        assert!(!folder.path().join("out").exists(), "{expected}");
+    }
+}
+
+#[test]
+fn an_excitation_is_chosen_for_the_rig() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = [
+        "record",
+        "--port",
+        "sim",
+        "--seconds",
+        "0.01",
+        "--out",
+        "a.csv",
+        "--rig",
+        "rig.toml",
+        "--load",
+        "2.5,0.03",
+    ];
+    assert_eq!(bowden(folder.path(), &rig).0, 0);
+    let plan = "schema = \"bowden-plan/1\"\n[limits]\nangle_rad = 0.3\n[[step]]\nkind = \"excite\"\nrig = \"rig.toml\"\nseconds = 9\n";
+    let (status, stdout, stderr) = run(folder.path(), plan, &["--dry-run"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let lines: Vec<&str> = stdout.lines().skip(1).collect();
+    assert_eq!(lines.len(), 3, "{stdout}");
+    // Three different motions, none beyond the limit, none all alike in form and frequency.
+    for line in &lines {
+        let amplitude: f64 = line.split(" of ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!((0.03..=0.3).contains(&amplitude) && line.ends_with("position, 3 s"), "{line}");
+    }
+    assert!(lines[0][2..] != lines[1][2..] && lines[1][2..] != lines[2][2..], "{stdout}");
+    assert!(!folder.path().join("out").exists());
+    let (_, _, stderr) = run(folder.path(), &plan.replace("seconds = 9", "seconds = 3"), &["--dry-run"]);
+    assert!(
+        stderr.starts_with("bowden: plan.toml:4:1: 3 s are too short for 3 motions; give 6 s or more"),
+        "{stderr}"
+    );
+}
