@@ -12,7 +12,7 @@ use crate::{bridge, retained};
 /// Its vector table, at the beginning of the system memory (RM0440, memory organization).
 const VECTORS: *const u32 = 0x1fff_0000 as *const u32;
 
-/// Value of MEM_MODE that shows the system memory at address 0, as it is when the pin starts the boot loader.
+/// Value of `MEM_MODE` that shows the system memory at address 0, as it is when the pin starts the boot loader.
 const SYSTEM_MEMORY: u8 = 1;
 
 /// Ends the run of the firmware.

@@ -226,7 +226,7 @@ fn put_aside(out: &Path) -> Result<PathBuf, Failure> {
         let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
         path.with_file_name(format!("{stem}.stopped-{number}.{ending}"))
     };
-    let number = (1..).find(|number| !aside(out, *number).exists()).unwrap_or(1);
+    let number = (1..=u32::MAX).find(|number| !aside(out, *number).exists()).unwrap_or(1);
     for path in files.iter().filter(|path| path.exists()) {
         std::fs::rename(path, aside(path, number)).map_err(|error| {
             let reason = bowden_core::output::describe(&error);

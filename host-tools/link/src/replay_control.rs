@@ -8,7 +8,7 @@ mod rows;
 use bowden_control::controller::Controller;
 use bowden_control::correction::ripple_table::RippleTable;
 use bowden_control::parameters::Parameters;
-use bowden_control::tick::{Command, Inbox, TickOutput};
+use bowden_control::tick::{Command, Inbox, TickConfig, TickOutput};
 use bowden_control::{SOURCE_DIGEST, reference_config, tick_config};
 use bowden_core::outcome::Failure;
 use bowden_core::recording::{RECORDING_GROUP, Recording};
@@ -110,7 +110,8 @@ pub fn replay(recording: &Recording) -> Result<Replayed, Failure> {
             .map_err(|refusal| refuse(&format!("its parameters do not fit together: {refusal}")))
     };
     let before = rows.row(start - 1)?;
-    let mut controller = start_of(config(&parameters)?, table, before.sample.encoder_count_raw, &first);
+    let mut controller =
+        start_of(&config(&parameters)?, table.as_ref(), before.sample.encoder_count_raw, &first);
     let mut replayed =
         Replayed { first_tick: first.tick, ticks: 0, orders: 0, difference: None, gap_after_tick: None };
     let mut last = before.tick;
@@ -148,24 +149,19 @@ pub fn replay(recording: &Recording) -> Result<Replayed, Failure> {
 
 /// The law at the known start. The counts before it say where the encoders are, but not whether 0 is a position or that there was
 /// none yet: then the first tick tells.
-fn start_of(
-    config: bowden_control::tick::TickConfig,
-    table: Option<RippleTable>,
-    counts: [i32; 2],
-    first: &Row,
-) -> Controller {
+fn start_of(config: &TickConfig, table: Option<&RippleTable>, counts: [i32; 2], first: &Row) -> Controller {
     let options = |count: i32| if count == 0 { vec![Some(0), None] } else { vec![Some(count)] };
     let mut starts = options(counts[0])
         .into_iter()
         .flat_map(|input| options(counts[1]).into_iter().map(move |joint| [input, joint]))
-        .map(|positions| Controller::resumed(config, table, first.tick as u32, positions));
+        .map(|positions| Controller::resumed(*config, table.copied(), first.tick as u32, positions));
     let fits = |start: &Controller| {
         let mut orders =
             Orders { command: Some(Command::Reset), point_raw: first.point_raw, point_is_taken: false };
         let output = start.clone().tick(&first.input, &mut orders);
         output.sample.encoder_count_raw == first.sample.encoder_count_raw
     };
-    let known = Controller::resumed(config, table, first.tick as u32, counts.map(Some));
+    let known = Controller::resumed(*config, table.copied(), first.tick as u32, counts.map(Some));
     starts.find(fits).unwrap_or(known)
 }
 

@@ -1,5 +1,6 @@
 //! `bowden run`: a bench run as a file.
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use bowden_core::outcome::{Failure, Outcome};
@@ -111,7 +112,7 @@ fn summary(name: &str, done: &[Done], before: usize) -> String {
     for Done { name, seconds, file, rows, loss } in done {
         let recorded = file.as_ref().map_or_else(String::new, |file| format!("  {rows} rows in {file}"));
         let loss = loss.as_ref().map_or_else(String::new, |loss| format!("  {loss}"));
-        text += &format!("{name:<24} {seconds:>9.3} s{recorded}{loss}\n");
+        let _ = writeln!(text, "{name:<24} {seconds:>9.3} s{recorded}{loss}");
     }
     text
 }

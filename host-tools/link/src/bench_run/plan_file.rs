@@ -19,6 +19,9 @@ const SCHEMA: &str = "bowden-plan/1";
 /// Kinds of steps.
 const KINDS: [&str; 5] = ["pretension_check", "home", "pause", "follow", "excite"];
 
+/// Modes of a motion.
+const MODES: [Mode; 4] = [Mode::Position, Mode::Torque, Mode::Hybrid, Mode::Impedance];
+
 const SECONDS: Bounds<'static> = Bounds { lower: 0.01, upper: 36_000.0, unit: "s" };
 const ANGLE: Bounds<'static> = Bounds { lower: -100.0, upper: 100.0, unit: "rad or N·m" };
 
@@ -294,7 +297,6 @@ fn read_motion(section: &Section) -> Result<Motion, Failure> {
     };
     let names: Vec<&str> = NAMES.iter().map(|(name, _)| *name).collect();
     let reference = chosen(section.text("reference", "form of the motion")?, "reference", &names)?;
-    const MODES: [Mode; 4] = [Mode::Position, Mode::Torque, Mode::Hybrid, Mode::Impedance];
     let mode = match section.string("mode")? {
         Some(text) => MODES[chosen(text, "mode", &MODES.map(mode_name))?],
         None => Mode::Position,
