@@ -32,7 +32,7 @@ pub struct Options {
 const CORRECTIONS: &str = "host-tools/docs/corrections.md";
 
 /// Benchmarks: package, target, and what its figures say.
-const BENCHES: [(&str, &str, &str); 4] = [
+const BENCHES: [(&str, &str, &str); 5] = [
     (
         "bowden-model",
         "joint",
@@ -44,6 +44,11 @@ const BENCHES: [(&str, &str, &str); 4] = [
         "the virtual bench: simulated milliseconds a second; 1 Kitem/s is real time",
     ),
     ("bowden-core", "reconstruction", "replay: what reconstructing the input angle gains over filtering it"),
+    (
+        "bowden",
+        "link",
+        "the link: full rate over a pseudo terminal, decoding, MCAP, the monitor's share of a core",
+    ),
     ("bowden-tests", "diagnosis", "diagnosis: time by stage, from 40 s at 1 kHz"),
 ];
 
