@@ -17,6 +17,7 @@
 
 mod form;
 mod list;
+mod port;
 
 use core::f64::consts::TAU;
 
@@ -31,101 +32,7 @@ use crate::search::Aftermath;
 
 pub use form::Form;
 pub use list::LAWS;
-
-/// Where a law acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Port {
-    /// Torque on the rotor at the input pulley, N·m; positive accelerates it.
-    MotorTorque,
-    /// Dry friction of motor and gear at the input pulley, N·m; it opposes motion.
-    MotorFriction,
-    /// Friction coefficient of both sheaths, relative: `mu (1 + y)`.
-    SheathFriction,
-    /// Radius of the input pulley, relative: `r1 (1 + y)`.
-    InputRadius,
-    /// Radius of the output pulley, relative: `r2 (1 + y)`.
-    OutputRadius,
-    /// Length of both tendons, relative to what the pretension stretches them by; a longer tendon is less tight.
-    TendonLength,
-    /// Torque on the joint, N·m; positive accelerates it.
-    JointTorque,
-    /// Friction of the joint, N·m; it opposes motion.
-    JointFriction,
-    /// What a sensor shows beyond the true value, in the unit of its channel.
-    Reading,
-}
-
-impl Port {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::MotorTorque => "motor_torque_nm",
-            Self::MotorFriction => "motor_friction_nm",
-            Self::SheathFriction => "sheath_friction",
-            Self::InputRadius => "input_radius",
-            Self::OutputRadius => "output_radius",
-            Self::TendonLength => "tendon_length",
-            Self::JointTorque => "joint_torque_nm",
-            Self::JointFriction => "joint_friction_nm",
-            Self::Reading => "reading",
-        }
-    }
-
-    /// What acts there, for a sentence.
-    #[must_use]
-    pub const fn meaning(self) -> &'static str {
-        match self {
-            Self::MotorTorque => "torque on the motor, at the input pulley",
-            Self::MotorFriction => "friction of motor and gear, at the input pulley",
-            Self::SheathFriction => "friction coefficient of the sheaths, relative change",
-            Self::InputRadius => "radius of the input pulley, relative change",
-            Self::OutputRadius => "radius of the output pulley, relative change",
-            Self::TendonLength => "length of both tendons, over what the pretension stretches them by",
-            Self::JointTorque => "torque on the joint",
-            Self::JointFriction => "friction of the joint, against its motion",
-            Self::Reading => "reading of the sensor, shown minus true",
-        }
-    }
-}
-
-/// On what a law depends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Variable {
-    /// Angle of the input pulley (of the rotor, for a motor's law), rad.
-    InputAngle,
-    /// Speed of the rotor, in input-pulley rad/s.
-    InputSpeed,
-    /// Torque of the motor's current at the input pulley, N·m.
-    MotorTorque,
-    /// Angle of the joint, rad.
-    JointAngle,
-    /// Speed of the joint, rad/s.
-    JointSpeed,
-    /// Mean tension of a tendon over the pretension.
-    RelativeTension,
-    /// Time since the start of the recording, s.
-    Time,
-    /// True value of the sensor's channel, in its unit.
-    Value,
-}
-
-impl Variable {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::InputAngle => "theta_in_rad",
-            Self::InputSpeed => "omega_in_rad_s",
-            Self::MotorTorque => "motor_torque_nm",
-            Self::JointAngle => "theta_out_rad",
-            Self::JointSpeed => "omega_out_rad_s",
-            Self::RelativeTension => "relative_tension",
-            Self::Time => "t_s",
-            Self::Value => "value",
-        }
-    }
-}
+pub use port::{Port, Variable};
 
 /// Turn of a branch below which a loop along an angle is not told from dry friction \[rad\]: three counts of a 12-bit encoder.
 const NARROWEST_LOOP_RAD: f64 = 5e-3;
@@ -223,17 +130,8 @@ impl Effect for Law {
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut MotorPort) {
-        let x = match self.variable {
-            Variable::InputSpeed => port.omega_rad_s,
-            Variable::MotorTorque => port.motor_torque_nm,
-            Variable::Time => port.t_s,
-            _ => port.theta_rad,
-        };
-        let y = self.form.remembered(p, state, x);
-        match self.port {
-            Port::MotorFriction => port.coulomb_nm = (port.coulomb_nm + y).max(0.0),
-            _ => port.torque_nm += y,
-        }
+        let y = self.form.remembered(p, state, self.variable.at_motor(port));
+        self.port.add_at_motor(y, port);
     }
 
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
@@ -244,52 +142,19 @@ impl Effect for Law {
                 port.radius_excess[end] += self.form.value(p, theta_rad);
                 port.wound_excess_rad[end] += self.form.integral(p, theta_rad);
             }
-            Port::TendonLength => {
-                let x = match self.variable {
-                    Variable::Time => port.t_s,
-                    Variable::JointAngle => port.theta_out_rad,
-                    _ => port.theta_in_rad,
-                };
-                let stretched_m = port.pretension_n / port.stiffness_n_per_m;
-                let longer_m = stretched_m * self.form.value(p, x);
-                for tendon in &mut port.tendons {
-                    tendon.added_length_m += longer_m;
-                }
-            }
-            _ => {
-                let pretension_n = port.pretension_n;
-                let (t_s, theta_in_rad) = (port.t_s, port.theta_in_rad);
-                for tendon in &mut port.tendons {
-                    let x = match self.variable {
-                        Variable::RelativeTension => tendon.mean_tension_n.max(0.0) / pretension_n,
-                        Variable::Time => t_s,
-                        _ => theta_in_rad,
-                    };
-                    let factor = (1.0 + self.form.value(p, x)).max(0.0);
-                    for slip in &mut tendon.slip {
-                        slip.friction_coefficient *= factor;
-                    }
-                }
-            }
+            _ => self.port.add_at_tendons(port, |port, tendon| {
+                self.form.value(p, self.variable.at_tendon(port, tendon))
+            }),
         }
     }
 
     fn joint(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut JointPort) {
-        let x = match self.variable {
-            Variable::JointSpeed => port.omega_rad_s,
-            Variable::Time => port.t_s,
-            _ => port.theta_rad,
-        };
-        let y = self.form.remembered(p, state, x);
-        match self.port {
-            Port::JointFriction => port.coulomb_nm = (port.coulomb_nm + y).max(0.0),
-            _ => port.torque_nm += y,
-        }
+        let y = self.form.remembered(p, state, self.variable.at_joint(port));
+        self.port.add_at_joint(y, port);
     }
 
     fn measure(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut SensorPort) {
-        let x = if self.variable == Variable::Time { port.t_s } else { port.value };
-        port.value += self.form.remembered(p, state, x);
+        port.value += self.form.remembered(p, state, self.variable.at_sensor(port));
     }
 }
 

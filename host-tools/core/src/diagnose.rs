@@ -13,6 +13,7 @@ mod constancy;
 mod decide;
 mod experiment;
 mod hum;
+mod hypotheses;
 mod law_candidates;
 mod layout;
 mod locked;
@@ -28,7 +29,7 @@ mod stages;
 mod stated_laws;
 mod unexplained;
 pub mod verdict;
-mod words;
+pub(crate) mod words;
 
 use std::collections::BTreeMap;
 
@@ -41,6 +42,7 @@ use crate::fit::free::Free;
 use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::variation::Variation;
+use crate::hypothesis;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
@@ -52,6 +54,7 @@ use decide::{Evidence, decide};
 use experiment::{Bearable, Shown};
 pub use experiment::{Experiment, SECONDS as EXPERIMENT_S};
 use hum::Hum;
+pub use hypotheses::Asked;
 use layout::Layout;
 use policy::POLICY;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
@@ -137,6 +140,19 @@ pub fn diagnose(study: &Study, asked: &[&str], progress: &dyn Progress) -> Resul
     diagnose_within(study, asked, &|_| true, progress)
 }
 
+/// As [`diagnose`], with hypotheses of the user's own as further terms of the search; each is also tried by itself, see
+/// [`verdict::TriedHypothesis`].
+///
+/// # Errors
+/// As [`diagnose`]; also what a hypothesis says when it fails, or when it acts on a part that the rig lacks.
+pub fn diagnose_hypotheses(
+    study: &Study,
+    asked: &Asked,
+    progress: &dyn Progress,
+) -> Result<Diagnosed, Failure> {
+    diagnose_asked(study, asked, &|_| true, progress)
+}
+
 /// As [`diagnose`], for a bench with limits: of the motions that separate hypotheses those within are preferred; one that is
 /// not allowed is named only where no allowed one separates them.
 ///
@@ -145,6 +161,15 @@ pub fn diagnose(study: &Study, asked: &[&str], progress: &dyn Progress) -> Resul
 pub fn diagnose_within(
     study: &Study,
     asked: &[&str],
+    allowed: Allowed,
+    progress: &dyn Progress,
+) -> Result<Diagnosed, Failure> {
+    diagnose_asked(study, &Asked { effects: asked, hypotheses: &[] }, allowed, progress)
+}
+
+fn diagnose_asked(
+    study: &Study,
+    asked: &Asked,
     allowed: Allowed,
     progress: &dyn Progress,
 ) -> Result<Diagnosed, Failure> {
@@ -172,7 +197,9 @@ pub fn diagnose_within(
         benches: benches?,
         allowed,
     };
-    case.diagnosed(asked, progress)
+    let attentive = asked.settled(&objective, &model, progress)?;
+    let diagnosed = case.diagnosed(asked, &attentive);
+    asked.failure().map_or(diagnosed, Err)
 }
 
 /// Refuses recordings of which nothing is left to judge by.
@@ -191,7 +218,7 @@ fn judged(objective: &Objective, training: &[&Recording]) -> Result<(), Failure>
 
 impl Case<'_> {
     /// The whole diagnosis.
-    fn diagnosed(&self, asked: &[&str], progress: &dyn Progress) -> Result<Diagnosed, Failure> {
+    fn diagnosed(&self, asked: &Asked, progress: &dyn Progress) -> Result<Diagnosed, Failure> {
         let Self { objective, model, .. } = *self;
         let mut selected = select(objective, &at_search_resolution(model, model), asked, progress)?;
         let before = Stage::of(objective, model)?;
@@ -376,6 +403,11 @@ impl Case<'_> {
                 laws.push((stated_laws::stated(law, &active, losses, &last.stds[values]), active));
                 continue;
             }
+            if let Some(hypothesis) = hypothesis::of(&active) {
+                let losses = [chosen.loss_before, chosen.loss_after];
+                laws.push((hypotheses::stated(hypothesis, &active, losses, &last.stds[values]), active));
+                continue;
+            }
             if let Some((_, named)) = effects.iter_mut().find(|(other, _)| other.is_beside(&active)) {
                 named.further.push(estimates(&active, &last.stds[values]));
                 continue;
@@ -455,6 +487,7 @@ impl Case<'_> {
             mismatch,
             residual_map: residual_map::residual_map(objective, stages),
             unexplained,
+            hypotheses: selected.trials.iter().map(|trial| hypotheses::tried(trial, selected)).collect(),
             laws: laws.into_iter().map(|(law, _)| law).collect(),
             fit: Fit { heldout: true, channels },
             heldout_loss: HeldOutLoss {

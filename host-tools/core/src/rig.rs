@@ -23,6 +23,7 @@ mod laws;
 mod parameter;
 mod parse;
 mod plausible;
+mod points;
 mod roles;
 pub mod section;
 mod undecided;

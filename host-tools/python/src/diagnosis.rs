@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use bowden_core::diagnose::Diagnosed;
 use bowden_core::diagnose::verdict::Trace;
+use bowden_core::diagnose::{Asked, Diagnosed};
 use bowden_core::output;
 use bowden_core::report::files::{self, rig_files};
 use bowden_core::report::render;
@@ -13,6 +13,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 
 use crate::errors::{Raise, raised};
+use crate::hypothesis::NativeHypothesis;
 use crate::rig::NativeRig;
 use crate::study::NativeStudy;
 use crate::work::run;
@@ -92,24 +93,36 @@ fn arrays_of<'py>(py: Python<'py>, trace: &Trace) -> TraceArrays<'py> {
 
 /// Diagnoses a study. After Ctrl-C the result holds what was found until then.
 #[pyfunction]
-#[pyo3(signature = (study, also, watcher=None, jobs=None))]
+#[pyo3(signature = (study, also, hypotheses, watcher=None, jobs=None))]
 pub fn diagnose(
     py: Python<'_>,
     study: &Bound<'_, NativeStudy>,
     also: Vec<String>,
+    hypotheses: Vec<Bound<'_, NativeHypothesis>>,
     watcher: Option<&Bound<'_, PyAny>>,
     jobs: Option<usize>,
 ) -> PyResult<NativeDiagnosis> {
     let LoadedStudy { study, documents, .. } = study.get().loaded();
-    let asked: Vec<&str> = also.iter().map(String::as_str).collect();
-    let (result, interrupted) =
-        run(py, watcher, jobs, |progress| bowden_core::diagnose::diagnose(study, &asked, progress))?;
+    let effects: Vec<&str> = also.iter().map(String::as_str).collect();
+    let stated = hypotheses.iter().map(|hypothesis| hypothesis.get().stated(py));
+    let (hypotheses, exceptions): (Vec<_>, Vec<_>) =
+        stated.collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
+    let asked = Asked { effects: &effects, hypotheses: &hypotheses };
+    let (result, interrupted) = run(py, watcher, jobs, |progress| {
+        bowden_core::diagnose::diagnose_hypotheses(study, &asked, progress)
+    })?;
     if let Some(interrupted) = interrupted
         && !interrupted.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py)
     {
         return Err(interrupted);
     }
-    let diagnosed = result.map_err(|failure| raised(py, &failure))?;
+    let diagnosed = result.map_err(|failure| {
+        let error = raised(py, &failure);
+        match exceptions.iter().find(|exception| exception.is_there()) {
+            Some(exception) => exception.cause_of(py, error),
+            None => error,
+        }
+    })?;
     let benches = study.benches.iter().map(|bench| bench.name.clone()).collect();
     Ok(NativeDiagnosis { diagnosed, documents: documents.clone(), benches, rig_files: rig_files(study) })
 }

@@ -8,6 +8,7 @@
 mod arrays;
 mod diagnosis;
 mod errors;
+mod hypothesis;
 mod recording;
 mod rig;
 mod study;
@@ -19,6 +20,8 @@ mod work;
 mod _bowden {
     #[pymodule_export]
     use crate::diagnosis::{NativeDiagnosis, diagnose};
+    #[pymodule_export]
+    use crate::hypothesis::NativeHypothesis;
     #[pymodule_export]
     use crate::recording::{NativeRecording, channels};
     #[pymodule_export]

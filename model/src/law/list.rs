@@ -2,7 +2,7 @@
 
 use super::{Form, Law, Port, Variable};
 use crate::channel::Channel;
-use crate::effect::{Component, Descriptor, ParameterSpec};
+use crate::effect::{Descriptor, ParameterSpec};
 
 const TENSIONS_AND_CURRENT: &[Channel] = &[
     Channel::F1,
@@ -67,17 +67,6 @@ const BRANCH_RAD: ParameterSpec =
 const CURVATURE: ParameterSpec =
     ParameterSpec::linear("curvature", "1/unit of the channel", [-10.0, 10.0], 0.002, "curvature");
 
-const fn component_of(port: Port) -> Component {
-    match port {
-        Port::MotorTorque | Port::MotorFriction => Component::Motor,
-        Port::SheathFriction | Port::InputRadius | Port::OutputRadius | Port::TendonLength => {
-            Component::Transmission
-        }
-        Port::JointTorque | Port::JointFriction => Component::Joint,
-        Port::Reading => Component::Sensors,
-    }
-}
-
 const fn channels_of(port: Port, form: Form) -> &'static [Channel] {
     match (port, form) {
         (Port::Reading, Form::Wave) => ANGLES,
@@ -96,7 +85,7 @@ macro_rules! law {
             formula: $formula,
             descriptor: &Descriptor {
                 id: $id,
-                component: component_of(Port::$port),
+                component: Port::$port.component(),
                 summary: Port::$port.meaning(),
                 parameters: &[$($parameter),+],
                 neutral: Some(0.0),

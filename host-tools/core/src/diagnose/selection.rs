@@ -2,6 +2,7 @@
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 
 mod exchange;
+mod hypotheses;
 mod laws;
 mod repeating;
 mod trying;
@@ -11,6 +12,7 @@ use std::cmp::Ordering;
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
 use rayon::prelude::*;
 
+use super::hypotheses::Asked;
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
 use super::policy::{POLICY, Policy};
@@ -20,6 +22,7 @@ use crate::fit::typical::typical;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
+pub use hypotheses::Trial;
 
 /// Candidates whose fit is brought to an end, of those that fit best so far.
 const FINALISTS: usize = 3;
@@ -106,6 +109,8 @@ pub struct Selected {
     pub chosen: Vec<Chosen>,
     /// What was tried.
     pub rounds: Vec<Round>,
+    /// Every hypothesis of the user by itself.
+    pub trials: Vec<Trial>,
     /// Whether the search came to its end.
     pub complete: bool,
 }
@@ -150,7 +155,7 @@ impl Selected {
 pub fn select(
     objective: &Objective,
     model: &JointModel,
-    asked: &[&str],
+    asked: &Asked,
     progress: &dyn Progress,
 ) -> Result<Selected, Failure> {
     let search = Search { objective, believed: model, asked, progress };
@@ -163,6 +168,7 @@ pub fn select(
         search.add_names(&mut present, &mut chosen, &mut rounds)?;
     }
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
+    let trials = search.trials(&nothing, &rounds)?;
     let model = present.without_ordinary();
     let searched = present.solution.model;
     let ordinary = present.layout.ordinary(&searched).to_vec();
@@ -174,6 +180,7 @@ pub fn select(
         model,
         chosen,
         rounds,
+        trials,
         complete: !progress.interrupted(),
     })
 }
@@ -264,8 +271,8 @@ struct Search<'a> {
     objective: &'a Objective,
     /// What the rig states.
     believed: &'a JointModel,
-    /// Effects that are tried beside those that always are.
-    asked: &'a [&'a str],
+    /// What is tried beside what always is.
+    asked: &'a Asked<'a>,
     progress: &'a dyn Progress,
 }
 

@@ -17,16 +17,7 @@ pub(super) fn stated(
     stds: &[Option<f64>],
 ) -> FoundLaw {
     let descriptor = active.descriptor();
-    let coefficients: BTreeMap<String, Estimate> = descriptor
-        .parameters
-        .iter()
-        .zip(active.parameters)
-        .zip(stds)
-        .map(|((spec, value), std)| {
-            let at_bound = value <= spec.lower || value >= spec.upper;
-            (spec.name.to_owned(), Estimate { value, std: *std, unit: spec.unit.to_owned(), at_bound })
-        })
-        .collect();
+    let coefficients = coefficients(active, stds);
     let heldout_improvement = 1.0 - loss_after / loss_before;
     let mut found = FoundLaw {
         component: descriptor.component.name().to_owned(),
@@ -53,9 +44,19 @@ pub(super) fn stated(
     found
 }
 
+/// Coefficients of a law or a hypothesis with their standard deviations.
+pub(super) fn coefficients(active: &ActiveEffect, stds: &[Option<f64>]) -> BTreeMap<String, Estimate> {
+    let of = active.descriptor().parameters.iter().zip(active.parameters).zip(stds);
+    of.map(|((spec, value), std)| {
+        let at_bound = value <= spec.lower || value >= spec.upper;
+        (spec.name.to_owned(), Estimate { value, std: *std, unit: spec.unit.to_owned(), at_bound })
+    })
+    .collect()
+}
+
 /// What is to be known of a law with coefficients that the data hardly tell: a strength that is not known to a half, and any at the end
 /// of its range. A phase and a place may lie at zero, however well they are known.
-fn looseness(law: &FoundLaw, strength: &str) -> String {
+pub(super) fn looseness(law: &FoundLaw, strength: &str) -> String {
     let is_unknown = |c: &Estimate| c.std.is_some_and(|std| std > 0.5 * c.value.abs());
     let weak = law.coefficients.get(strength).filter(|c| is_unknown(c));
     let weak = weak.map(|_| format!("{strength} is not known to a half"));
@@ -72,7 +73,7 @@ fn looseness(law: &FoundLaw, strength: &str) -> String {
 }
 
 /// Port, formula and coefficients in one line.
-fn in_numbers(law: &FoundLaw) -> String {
+pub(super) fn in_numbers(law: &FoundLaw) -> String {
     let mut text = format!("{} = {}", law.port, law.formula);
     for (place, (name, value)) in law.coefficients.iter().enumerate() {
         let before = if place == 0 { " with" } else { "," };
@@ -97,7 +98,7 @@ pub(super) fn unexplained(
     let answers = mismatch.iter().find(|mismatch| mismatch.component == first.component);
     let channel = first.channel.clone().or_else(|| Some(answers.or(mismatch.first())?.channel.clone()));
     let coefficient = |name: &str| first.coefficients.get(name).map(|value| value.value);
-    let law = law::of(active)?;
+    let oscillates = law::of(active).is_some_and(|law| law.form() == Form::Oscillation);
     let sentences: Vec<&str> = laws.iter().map(|(law, _)| law.sentence.as_str()).collect();
     let rest = left.map(|left| format!(" What is left then: {}", left.sentence)).unwrap_or_default();
     Some(Unexplained {
@@ -105,7 +106,7 @@ pub(super) fn unexplained(
         channel: channel.unwrap_or_default(),
         depends_on: first.variables.clone(),
         period_rad: coefficient("cycles_per_turn").map(|cycles| std::f64::consts::TAU / cycles),
-        frequency_hz: coefficient("frequency_hz").filter(|_| law.form() == Form::Oscillation),
+        frequency_hz: coefficient("frequency_hz").filter(|_| oscillates),
         free_form: None,
         modelled: true,
         law: Some(laws.iter().map(|(law, _)| in_numbers(law)).collect::<Vec<_>>().join("; ")),

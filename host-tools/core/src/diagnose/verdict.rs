@@ -218,6 +218,52 @@ pub struct FoundLaw {
     pub sentence: String,
 }
 
+/// A hypothesis of the user by itself: what it does beside the recalibrated rig, against what else does best there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TriedHypothesis {
+    /// Name.
+    pub name: String,
+    /// Part of the joint.
+    pub component: String,
+    /// Where it acts.
+    pub port: String,
+    /// On what it depends.
+    pub variables: Vec<String>,
+    /// Channel, for a hypothesis on a sensor.
+    pub channel: Option<String>,
+    /// Fitted coefficients.
+    pub coefficients: BTreeMap<String, Estimate>,
+    /// Held-out loss without it.
+    pub heldout_loss_without: f64,
+    /// Held-out loss with it.
+    pub heldout_loss: f64,
+    /// Best effect of the catalogue in its place.
+    pub catalogue: Option<RivalLoss>,
+    /// Best closed form in its place, at any port.
+    pub closed_form: Option<RivalLoss>,
+    /// Best curve through six values at its port, over one of its variables, in its place.
+    pub free_curve: Option<RivalLoss>,
+    /// Whether its held-out loss is below that of the best effect of the catalogue.
+    pub beats_catalogue: bool,
+    /// Whether its held-out loss is below that of the best closed form.
+    pub beats_closed_form: bool,
+    /// Whether its held-out loss is below that of the best free curve.
+    pub beats_free_curve: bool,
+    /// Whether the search found it: it is then among the laws, and the diagnosed rig simulates it.
+    pub found: bool,
+    /// The same in a sentence or two.
+    pub sentence: String,
+}
+
+/// What else was tried, and how well it does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RivalLoss {
+    /// Effect, law, or variable of a curve.
+    pub id: String,
+    /// Held-out loss with it.
+    pub heldout_loss: f64,
+}
+
 /// A curve or wave over one variable, fitted to what is left of the channel named beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FreeForm {
@@ -333,6 +379,9 @@ pub struct Diagnosis {
     pub unexplained: Option<Unexplained>,
     /// Laws that describe a part of it, as the diagnosed rig simulates them.
     pub laws: Vec<FoundLaw>,
+    /// Hypotheses of the user, each by itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hypotheses: Vec<TriedHypothesis>,
     /// Scores.
     pub fit: Fit,
     /// Loss over all channels on held-out data.

@@ -103,7 +103,7 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
 }
 
 /// Three significant digits, in plain digits where that is readable.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -163,6 +163,7 @@ fn diagnosis() -> Diagnosis {
             law: None,
             sentence: "Close to the end of its travel the joint moves less than the tendons say.".into(),
         }),
+        hypotheses: Vec::new(),
         laws: Vec::new(),
         residual_map: residual_map(),
         policy: crate::diagnose::policy::POLICY,

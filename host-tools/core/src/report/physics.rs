@@ -17,6 +17,7 @@ pub(super) fn section(findings: &Findings) -> Markup {
             }
             @for effect in &diagnosis.effects { (card(effect)) }
             @for law in &diagnosis.laws { (laws::card(law)) }
+            @for tried in &diagnosis.hypotheses { (laws::hypothesis(tried)) }
             @if let Some(left) = diagnosis.unexplained.as_ref().filter(|left| !left.modelled) {
                 (free_form::card(left))
             }

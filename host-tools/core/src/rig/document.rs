@@ -8,7 +8,8 @@ use bowden_model::parameters::nominal;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
 
 use super::effects::CHANNEL_KEY;
-use super::{Rig, RigParameter, Undecided, laws, read_text, undecided};
+use super::{Rig, RigParameter, Undecided, laws, points, read_text, undecided};
+use crate::hypothesis;
 use crate::outcome::Failure;
 use crate::output;
 
@@ -126,6 +127,9 @@ impl RigDocument {
         let refuse = |what: &str| Failure::failed(format!("{}: {what} cannot take effect {id}", self.source));
         if let Some(law) = law::of(active) {
             return laws::insert(&mut self.document, law, active).ok_or_else(|| refuse("law"));
+        }
+        if let Some(hypothesis) = hypothesis::of(active) {
+            return points::insert(&mut self.document, hypothesis, active).ok_or_else(|| refuse("law"));
         }
         let simulation = section_mut(&mut self.document, "simulation").ok_or_else(|| refuse("simulation"))?;
         let list = simulation.entry("effects").or_insert_with(|| Item::Value(Value::Array(Array::new())));

@@ -10,7 +10,7 @@
 //! units = { amplitude_nm = "N·m", exponent = "1" }
 //! ```
 //!
-//! A law of a sensor also names its `channel`. The formulas that a simulation can run are those of
+//! A law of a sensor also names its `channel`. In place of a formula a law may state [`points`]. The formulas that a simulation can run are those of
 //! [`bowden_model::law::LAWS`]; another one is refused with those of its port.
 
 use bowden_model::channel::Channel;
@@ -18,6 +18,7 @@ use bowden_model::effect::{ActiveEffect, Effect, Target};
 use bowden_model::law::{LAWS, Law};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
+use super::points;
 use super::section::{Bounds, Section, advice};
 use crate::outcome::Failure;
 
@@ -33,6 +34,9 @@ pub(super) fn read(file: &Section) -> Result<Vec<ActiveEffect>, Failure> {
 }
 
 fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
+    if let Some(value) = section.get(points::POINTS) {
+        return points::read(section, value);
+    }
     section.refuse_unknown("key", KEYS)?;
     let (port, port_span) = section.text("port", "where it acts")?;
     let at_port = || LAWS.iter().filter(move |law| law.port().name() == port);

@@ -15,6 +15,7 @@ SI units throughout; the unit is in the name. `bowden.plots` draws with matplotl
 
 from bowden.diagnosis import Diagnosis, Trace
 from bowden.errors import Error, InputError, RepairedWarning, StoppedEarlyWarning
+from bowden.hypothesis import Coefficient, Hypothesis
 from bowden.progress import ProgressLike
 from bowden.recording import UNITS, Frame, Recording, RecordingLike
 from bowden.results import (
@@ -32,6 +33,8 @@ from bowden.results import (
     Recalibrated,
     ResidualMap,
     Rival,
+    RivalLoss,
+    TriedHypothesis,
     Unexplained,
 )
 from bowden.rig import Rig, RigLike
@@ -43,6 +46,7 @@ __all__ = [
     "UNITS",
     "ChannelError",
     "ChannelFit",
+    "Coefficient",
     "Diagnosis",
     "Effect",
     "Error",
@@ -52,6 +56,7 @@ __all__ = [
     "Frame",
     "FreeForm",
     "HeldOutLoss",
+    "Hypothesis",
     "InputError",
     "Law",
     "MapAxis",
@@ -67,11 +72,13 @@ __all__ = [
     "Rig",
     "RigLike",
     "Rival",
+    "RivalLoss",
     "StoppedEarlyWarning",
     "Study",
     "StudyRecording",
     "Survey",
     "Trace",
+    "TriedHypothesis",
     "Unexplained",
     "diagnose",
     "fit",

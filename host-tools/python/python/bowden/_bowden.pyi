@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "NativeDiagnosis",
+    "NativeHypothesis",
     "NativePlan",
     "NativeRecording",
     "NativeRig",
@@ -98,6 +99,18 @@ class NativeDiagnosis:
     def save(self, folder: _Path) -> Path: ...
 
 @final
+class NativeHypothesis:
+    def __new__(
+        cls,
+        name: str,
+        port: str,
+        channel: str | None,
+        variables: Sequence[tuple[str, tuple[float, float] | None]],
+        coefficients: Sequence[tuple[str, str, float, float, Sequence[float]]],
+        evaluate: Callable[[list[_Floats], list[float]], _Floats],
+    ) -> Self: ...
+
+@final
 class NativePlan:
     def __new__(cls, folder: _Path, rules: Sequence[tuple[str, _Path]], out: _Path) -> Self: ...
     def __len__(self) -> int: ...
@@ -108,7 +121,11 @@ class NativePlan:
 
 def channels() -> list[tuple[str, str]]: ...
 def diagnose(
-    study: NativeStudy, also: Sequence[str], watcher: _Watcher | None = None, jobs: int | None = None
+    study: NativeStudy,
+    also: Sequence[str],
+    hypotheses: Sequence[NativeHypothesis],
+    watcher: _Watcher | None = None,
+    jobs: int | None = None,
 ) -> NativeDiagnosis: ...
 def fit(
     study: NativeStudy, watcher: _Watcher | None = None, jobs: int | None = None

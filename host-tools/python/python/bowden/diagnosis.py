@@ -22,6 +22,7 @@ from bowden.results import (
     Mismatch,
     Recalibrated,
     ResidualMap,
+    TriedHypothesis,
     Unexplained,
     read,
 )
@@ -77,6 +78,11 @@ class Diagnosis:
     def laws(self) -> tuple[Law, ...]:
         """Laws that describe a part of what has no name; the diagnosed rig simulates them."""
         return read(tuple[Law, ...], self._data["laws"])
+
+    @cached_property
+    def hypotheses(self) -> tuple[TriedHypothesis, ...]:
+        """Every hypothesis by itself, in the order in which they were stated."""
+        return read(tuple[TriedHypothesis, ...], self._data.get("hypotheses", []))
 
     @cached_property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
@@ -172,4 +178,7 @@ class Diagnosis:
         for law in self.laws:
             values = ", ".join(f"{name} = {estimate}" for name, estimate in law.coefficients.items())
             lines += ["", f"`{law.port} = {law.formula}` with {values}"]
+        for tried in self.hypotheses:
+            values = ", ".join(f"{name} = {estimate}" for name, estimate in tried.coefficients.items())
+            lines += ["", f"{tried.sentence} With {values}."]
         return "\n".join(lines)

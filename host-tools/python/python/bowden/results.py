@@ -23,6 +23,8 @@ __all__ = [
     "Recalibrated",
     "ResidualMap",
     "Rival",
+    "RivalLoss",
+    "TriedHypothesis",
     "Unexplained",
 ]
 
@@ -38,6 +40,11 @@ class Estimate:
     """Unit; `1` for a ratio."""
     at_bound: bool = False
     """Whether the value lies at an end of its accepted range."""
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Ends of the interval that holds the true value in 95 of 100 cases, if errors are normal; `None` at a bound."""
+        return None if self.std is None else (self.value - 1.96 * self.std, self.value + 1.96 * self.std)
 
     def __str__(self) -> str:
         spread = "" if self.std is None else f" ± {self.std:.2g}"
@@ -173,6 +180,41 @@ class Law:
     formula: str
     coefficients: dict[str, Estimate]
     heldout_improvement: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class RivalLoss:
+    """What else was tried in the place of a hypothesis."""
+
+    id: str
+    """Effect, law, or variable of a curve."""
+    heldout_loss: float
+
+
+@dataclass(frozen=True)
+class TriedHypothesis:
+    """A hypothesis by itself beside the recalibrated rig, against what else does best in its place."""
+
+    name: str
+    component: str
+    port: str
+    variables: tuple[str, ...]
+    channel: str | None
+    coefficients: dict[str, Estimate]
+    heldout_loss_without: float
+    heldout_loss: float
+    catalogue: RivalLoss | None
+    """Best effect of the catalogue."""
+    closed_form: RivalLoss | None
+    """Best closed form, at any port."""
+    free_curve: RivalLoss | None
+    """Best curve through six values at the same port, over one of the variables."""
+    beats_catalogue: bool
+    beats_closed_form: bool
+    beats_free_curve: bool
+    found: bool
+    """Whether the search found it: it is then one of the laws, and the diagnosed rig simulates it."""
     sentence: str
 
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from bowden import _bowden
 from bowden.diagnosis import Diagnosis
 from bowden.errors import InputError, RepairedWarning, StoppedEarlyWarning
+from bowden.hypothesis import Hypothesis
 from bowden.progress import ProgressLike, threads, watching
 from bowden.recording import Recording, RecordingLike, as_recording
 from bowden.results import ChannelError, FittedParameter, read
@@ -58,6 +59,7 @@ def diagnose(
     *,
     heldout: RecordingLike | Iterable[RecordingLike] = (),
     also: Iterable[str] = (),
+    hypotheses: Iterable[Hypothesis] = (),
     progress: ProgressLike = True,
     jobs: int | None = None,
 ) -> Diagnosis:
@@ -75,16 +77,18 @@ def diagnose(
         rig: What is believed about the bench: a `Rig` or a path. A study names its own.
         heldout: Recordings that judge the diagnosis and take no other part; without them every third second of the others is held out.
         also: Effects to be tried that are tried on request only.
+        hypotheses: Functions of your own, as further terms of the search; `Diagnosis.hypotheses` says what each does.
         progress: Shows a bar on stderr; or a function, see `ProgressLike`.
         jobs: Threads to work with; one a processor by default.
 
     Raises:
-        InputError: Unusable input, with file, line and what to do.
+        InputError: Unusable input, with file, line and what to do; a hypothesis whose function raised an exception (its cause).
     """
+    stated = [hypothesis._native for hypothesis in hypotheses]
     study = as_study(recordings, rig, heldout)._native()
     _warn(study.notes)
     with watching(progress) as watcher:
-        diagnosis = Diagnosis(_bowden.diagnose(study, list(also), watcher, threads(jobs)))
+        diagnosis = Diagnosis(_bowden.diagnose(study, list(also), stated, watcher, threads(jobs)))
     if not diagnosis.complete:
         reason = "stopped early: not every effect was tried; run it again to the end before trusting it"
         warnings.warn(reason, StoppedEarlyWarning, stacklevel=2)

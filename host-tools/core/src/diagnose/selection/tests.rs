@@ -33,6 +33,7 @@ fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig
         model: with(&[found]),
         chosen: Vec::new(),
         rounds: Vec::new(),
+        trials: Vec::new(),
         complete: true,
     };
     let withdrawn = selected.withdrawn();

@@ -3,13 +3,14 @@
 use rayon::prelude::*;
 
 use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
-use crate::diagnose::candidates::candidates;
+use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
 use crate::diagnose::onset::between_recordings;
 use crate::diagnose::screening::{Present, Screened, screen};
 use crate::fit::objective::Part;
 use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
 use crate::outcome::Failure;
+use crate::simulation::Prediction;
 
 /// Candidates that are fitted, of those that screening ranks first.
 const FITTED: usize = 7;
@@ -30,18 +31,33 @@ impl Search<'_> {
         kind: Kind,
         promising: f64,
     ) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
+        let predictions = self.objective.predict(&present.solution.model)?;
+        let model = present.without_ordinary();
+        let all = match kind {
+            Kind::Name => {
+                let mut all = candidates(&model, self.objective, &predictions, self.asked.effects);
+                all.extend(self.asked.candidates(&model));
+                all
+            }
+            Kind::Law => law_candidates(&model, self.objective, &predictions),
+        };
+        self.best_of(present, &predictions, &all, promising)
+    }
+
+    /// The same for given candidates; `predictions` are those of `present`.
+    pub(super) fn best_of(
+        &self,
+        present: &Fitted,
+        predictions: &[Prediction],
+        all: &[Candidate],
+        promising: f64,
+    ) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
         let Self { objective, progress, .. } = *self;
         let ranked = {
-            let predictions = objective.predict(&present.solution.model)?;
-            let model = present.without_ordinary();
-            let all = match kind {
-                Kind::Name => candidates(&model, objective, &predictions, self.asked),
-                Kind::Law => law_candidates(&model, objective, &predictions),
-            };
             progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
             let Fitted { layout, solution, .. } = present;
-            let present = Present { believed: self.believed, solution, layout, predictions: &predictions };
-            screen(objective, &present, &all, progress)
+            let present = Present { believed: self.believed, solution, layout, predictions };
+            screen(objective, &present, all, progress)
         };
         let promising = ranked.iter().filter(|s| s.gain > promising).take(FITTED).count();
         let mut record: Vec<Attempted> = ranked

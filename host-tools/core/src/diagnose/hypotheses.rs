@@ -1,0 +1,183 @@
+//! Hypotheses of the user among the candidates, and what is said of each.
+
+use bowden_model::effect::{ActiveEffect, Effect};
+
+use super::candidates::{Candidate, fits};
+use super::selection::{Selected, Trial};
+use super::stated_laws::{coefficients, in_numbers, looseness};
+use super::verdict::{FoundLaw, RivalLoss, TriedHypothesis};
+use super::words::short;
+use crate::fit::objective::Objective;
+use crate::hypothesis::Hypothesis;
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
+use crate::progress::Progress;
+
+/// Strengths, in those of a start, at which a hypothesis of one sign is tried.
+const STRENGTHS: [f64; 3] = [0.4, 1.0, 2.5];
+
+/// What a search tries beside what it always does.
+#[derive(Clone, Copy, Default)]
+pub struct Asked<'a> {
+    /// Effects of the catalogue that are tried on request only.
+    pub effects: &'a [&'a str],
+    /// Hypotheses; their names differ.
+    pub hypotheses: &'a [&'static Hypothesis],
+}
+
+impl Asked<'_> {
+    /// Lets every hypothesis see what its variables do while `model` replays the recordings, and fixes their grids by that. The progress that is
+    /// returned ends the work as soon as a hypothesis fails.
+    ///
+    /// # Errors
+    /// Two of one name, or one on a part that the rig lacks.
+    pub(super) fn settled<'p>(
+        &'p self,
+        objective: &Objective,
+        model: &JointModel,
+        progress: &'p dyn Progress,
+    ) -> Result<Attentive<'p>, Failure> {
+        for (place, hypothesis) in self.hypotheses.iter().enumerate() {
+            let name = hypothesis.name();
+            if self.hypotheses[..place].iter().any(|other| other.name() == name) {
+                return Err(Failure::bad_input(format!("hypothesis `{name}`: is stated twice; rename one")));
+            }
+            let mut with = model.clone();
+            with.effects.extend(hypothesis.starts().first());
+            if fits(model, hypothesis.descriptor().component) {
+                objective.predict(&with)?;
+            }
+            hypothesis.settle()?;
+        }
+        Ok(Attentive { progress, asked: self })
+    }
+
+    /// What the first hypothesis that failed says.
+    pub(super) fn failure(&self) -> Option<Failure> {
+        self.hypotheses.iter().find_map(|hypothesis| hypothesis.failure())
+    }
+
+    /// Every hypothesis that `model` does not contain.
+    pub(super) fn candidates(&self, model: &JointModel) -> Vec<Candidate> {
+        let absent = |hypothesis: &&&'static Hypothesis| {
+            model.effects.iter().all(|active| active.descriptor().id != hypothesis.descriptor().id)
+        };
+        self.hypotheses.iter().filter(absent).map(|hypothesis| candidate(hypothesis)).collect()
+    }
+}
+
+/// A hypothesis from all its starts; one that vanishes with its first coefficient, and has one sign, at several strengths.
+pub(super) fn candidate(hypothesis: &'static Hypothesis) -> Candidate {
+    let descriptor = hypothesis.descriptor();
+    let strength = descriptor.parameters[0];
+    let one_sign = descriptor.neutral.is_some() && strength.lower >= 0.0;
+    let factors: &[f64] = if one_sign { &STRENGTHS } else { &[1.0] };
+    let at = |start: ActiveEffect| {
+        factors.iter().map(move |factor| {
+            let value = factor * start.parameters[0];
+            start.with(strength.name, value.clamp(strength.lower, strength.upper))
+        })
+    };
+    Candidate { starts: hypothesis.starts().into_iter().flat_map(at).collect() }
+}
+
+/// Progress of work that a failing hypothesis ends.
+pub(super) struct Attentive<'a> {
+    progress: &'a dyn Progress,
+    asked: &'a Asked<'a>,
+}
+
+impl Progress for Attentive<'_> {
+    fn stage(&self, name: &str, steps: u64) {
+        self.progress.stage(name, steps);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.progress.advance(steps);
+    }
+
+    fn interrupted(&self) -> bool {
+        self.asked.failure().is_some() || self.progress.interrupted()
+    }
+}
+
+/// A hypothesis that was found, as a law.
+pub(super) fn stated(
+    hypothesis: &Hypothesis,
+    active: &ActiveEffect,
+    [loss_before, loss_after]: [f64; 2],
+    stds: &[Option<f64>],
+) -> FoundLaw {
+    let heldout_improvement = 1.0 - loss_after / loss_before;
+    let mut found = FoundLaw {
+        component: active.descriptor().component.name().to_owned(),
+        port: hypothesis.port().name().to_owned(),
+        variables: names_of(hypothesis),
+        channel: active.target.name().map(str::to_owned),
+        formula: hypothesis.formula(),
+        coefficients: coefficients(active, stds),
+        heldout_improvement,
+        sentence: String::new(),
+    };
+    let strength = active.descriptor().parameters.first().map_or("", |spec| spec.name);
+    found.sentence = format!(
+        "Hypothesis {}: {}. It removes {:.0} % of the difference on data the fit did not see.{}",
+        hypothesis.name(),
+        in_numbers(&found),
+        100.0 * heldout_improvement,
+        looseness(&found, strength)
+    );
+    found
+}
+
+fn names_of(hypothesis: &Hypothesis) -> Vec<String> {
+    hypothesis.variables().iter().map(|variable| variable.name().to_owned()).collect()
+}
+
+/// What is said of a hypothesis by itself.
+pub(super) fn tried(trial: &Trial, selected: &Selected) -> TriedHypothesis {
+    let Trial { hypothesis, effect, stds, loss_without, loss, rivals } = trial;
+    let descriptor = effect.descriptor();
+    let found = selected.chosen.iter().any(|chosen| chosen.effect.descriptor().id == descriptor.id);
+    let beats = |rival: &Option<RivalLoss>| rival.as_ref().is_none_or(|rival| *loss < rival.heldout_loss);
+    TriedHypothesis {
+        name: hypothesis.name().to_owned(),
+        component: descriptor.component.name().to_owned(),
+        port: hypothesis.port().name().to_owned(),
+        variables: names_of(hypothesis),
+        channel: effect.target.name().map(str::to_owned),
+        coefficients: coefficients(effect, stds),
+        heldout_loss_without: *loss_without,
+        heldout_loss: *loss,
+        beats_catalogue: beats(&rivals.catalogue),
+        beats_closed_form: beats(&rivals.closed_form),
+        beats_free_curve: beats(&rivals.free_curve),
+        catalogue: rivals.catalogue.clone(),
+        closed_form: rivals.closed_form.clone(),
+        free_curve: rivals.free_curve.clone(),
+        found,
+        sentence: sentence(trial, found),
+    }
+}
+
+fn sentence(trial: &Trial, found: bool) -> String {
+    let mut text = format!(
+        "Beside the recalibrated rig, {} brings the held-out loss from {} to {}",
+        trial.hypothesis.name(),
+        short(trial.loss_without),
+        short(trial.loss)
+    );
+    let rivals = [
+        ("the best effect of the catalogue", &trial.rivals.catalogue),
+        ("the best closed form", &trial.rivals.closed_form),
+        ("the best free curve, over", &trial.rivals.free_curve),
+    ];
+    for (what, rival) in rivals {
+        text += &match rival {
+            Some(RivalLoss { id, heldout_loss }) => format!("; {what} {id} to {}", short(*heldout_loss)),
+            None => format!("; {what} promises too little for a fit"),
+        };
+    }
+    let end = if found { "The diagnosed rig simulates it." } else { "It is not in the diagnosed rig." };
+    format!("{text}. {end}")
+}
