@@ -54,6 +54,10 @@ enum Command {
     Fit(FitArguments),
     /// Simulate a rig from a reference: controller, motor, joint and sensors
     Simulate(SimulateArguments),
+    /// Make rigs of MuJoCo models and URDFs
+    Rig(crate::commands::neighbours::RigArguments),
+    /// Write rigs as models of other simulators
+    Export(crate::commands::neighbours::ExportArguments),
     /// Make effects of the catalogue from what diagnoses have found
     Effect(crate::commands::effect::EffectArguments),
     /// Run the joint on a driver board along a reference and record every control tick
@@ -121,6 +125,8 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::ReplayControl(arguments) => under_way(cli, "replaying", || arguments.run()),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Simulate(arguments) => under_way(cli, "simulating", || arguments.run()),
+        Command::Rig(arguments) => arguments.run(),
+        Command::Export(arguments) => arguments.run(),
         Command::Effect(arguments) => arguments.run(),
         Command::Record(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Run(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),

@@ -14,6 +14,7 @@ pub mod investigate;
 mod limits;
 pub mod log;
 pub mod monitor;
+pub mod neighbours;
 pub mod params;
 mod port;
 pub mod record;

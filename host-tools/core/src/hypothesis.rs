@@ -61,8 +61,11 @@ enum Source {
     Function(Asked),
 }
 
+/// Address of a hypothesis, coefficients, and its values for them.
+type Kept = (usize, [f64; MAX_PARAMETERS], Rc<Table>);
+
 thread_local! {
-    static TABLES: RefCell<Vec<(usize, [f64; MAX_PARAMETERS], Rc<Table>)>> = const { RefCell::new(Vec::new()) };
+    static TABLES: RefCell<Vec<Kept>> = const { RefCell::new(Vec::new()) };
 }
 
 impl Hypothesis {

@@ -10,6 +10,7 @@ pub mod fit;
 pub mod formula;
 pub mod hypothesis;
 pub mod joint_model;
+pub mod neighbours;
 pub mod outcome;
 pub mod output;
 pub mod progress;

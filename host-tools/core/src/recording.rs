@@ -21,6 +21,7 @@ mod origin;
 mod parquet_file;
 mod place;
 mod recover;
+mod ros2;
 mod row;
 mod row_writer;
 mod spikes;

@@ -130,7 +130,7 @@ impl Function for PythonFunction {
                 let columns = columns.iter().map(|column| PyArray1::from_slice(py, column));
                 let columns = PyList::new(py, columns.collect::<Vec<_>>())?;
                 let values = self.function.call1(py, (columns, coefficients.to_vec()))?;
-                let values: PyReadonlyArray1<'_, f64> = values.extract(py).map_err(PyErr::from)?;
+                let values: PyReadonlyArray1<'_, f64> = values.extract(py)?;
                 Ok(values.as_slice()?.to_vec())
             };
             call().map_err(|error| {

@@ -9,6 +9,7 @@ mod arrays;
 mod diagnosis;
 mod errors;
 mod hypothesis;
+mod neighbours;
 mod recording;
 mod rig;
 mod study;
@@ -22,6 +23,8 @@ mod _bowden {
     use crate::diagnosis::{NativeDiagnosis, diagnose};
     #[pymodule_export]
     use crate::hypothesis::NativeHypothesis;
+    #[pymodule_export]
+    use crate::neighbours::{mujoco_model, rig_of_model};
     #[pymodule_export]
     use crate::recording::{NativeRecording, channels};
     #[pymodule_export]

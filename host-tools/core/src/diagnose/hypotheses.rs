@@ -1,5 +1,7 @@
 //! Hypotheses of the user among the candidates, and what is said of each.
 
+use std::fmt::Write;
+
 use bowden_model::effect::{ActiveEffect, Effect};
 
 use super::candidates::{Candidate, fits};
@@ -173,9 +175,10 @@ fn sentence(trial: &Trial, found: bool) -> String {
         ("the best free curve, over", &trial.rivals.free_curve),
     ];
     for (what, rival) in rivals {
-        text += &match rival {
-            Some(RivalLoss { id, heldout_loss }) => format!("; {what} {id} to {}", short(*heldout_loss)),
-            None => format!("; {what} promises too little for a fit"),
+        // Writing to a String cannot fail.
+        let _ = match rival {
+            Some(RivalLoss { id, heldout_loss }) => write!(text, "; {what} {id} to {}", short(*heldout_loss)),
+            None => write!(text, "; {what} promises too little for a fit"),
         };
     }
     let end = if found { "The diagnosed rig simulates it." } else { "It is not in the diagnosed rig." };

@@ -220,6 +220,7 @@ pub struct FoundLaw {
 
 /// A hypothesis of the user by itself: what it does beside the recalibrated rig, against what else does best there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "answers to four questions, each a key of the file")]
 pub struct TriedHypothesis {
     /// Name.
     pub name: String,

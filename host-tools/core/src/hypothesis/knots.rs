@@ -26,13 +26,15 @@ pub(super) fn widened([low, high]: [f64; 2], variable: Variable) -> [f64; 2] {
     [(low - MARGIN * width).max(lowest), high + MARGIN * width]
 }
 
+/// From a variable to where knots lie evenly, or back.
+type Map = fn(f64) -> f64;
+
 /// Knots over a range, one of them zero where the range holds it.
 pub(super) fn axis([low, high]: [f64; 2], variable: Variable, variables: usize) -> Option<Axis> {
     let intervals = INTERVALS[usize::from(variables > 1)];
     let largest = low.abs().max(high.abs());
     let scale = largest / GRADING.sinh();
-    let (to, from): (fn(f64) -> f64, fn(f64) -> f64) =
-        if is_graded(variable) { (f64::asinh, f64::sinh) } else { (|x| x, |x| x) };
+    let (to, from): (Map, Map) = if is_graded(variable) { (f64::asinh, f64::sinh) } else { (|x| x, |x| x) };
     let scale = if is_graded(variable) { scale } else { 1.0 };
     let (start, end) = (to(low / scale), to(high / scale));
     let step = (end - start) / intervals as f64;

@@ -6,7 +6,7 @@ use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Descriptor, ParameterSpec};
 use bowden_model::law::Port;
 
-use super::{Hypothesis, Table};
+use super::{Axis, Hypothesis, Table};
 
 static KNOWN: RwLock<Vec<&'static Hypothesis>> = RwLock::new(Vec::new());
 
@@ -53,7 +53,7 @@ pub(super) fn descriptor(
 
 /// Identifier of a law of points: its name, and a checksum of the points (FNV-1a). Two tables of one name are two effects.
 pub(super) fn id_of_points(name: &str, table: &Table) -> String {
-    let knots = table.axes().iter().flat_map(|axis| axis.knots());
+    let knots = table.axes().iter().flat_map(Axis::knots);
     let bytes = knots.chain(table.values()).flat_map(|value| value.to_bits().to_le_bytes());
     let sum = bytes
         .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));

@@ -2,7 +2,7 @@
 //!
 //! A message on [`TOPIC`] is an object with one property a column, `t_s` among them; the schema names them in
 //! order. `log_time` is `t_s` in nanoseconds from an epoch of 0, for players that sort by it; what counts is the
-//! property, which keeps every bit. Messages on other topics are passed over: they take no part in anything and are
+//! property, which keeps every bit. Without that topic, joint states of a ROS 2 bag are read ([`super::ros2`]). Messages on other topics are passed over: they take no part in anything and are
 //! not copied when the recording is written elsewhere, which [`Recording::topics_passed_over`] tells.
 
 use std::borrow::Cow;
@@ -21,6 +21,7 @@ use serde_json::value::RawValue;
 use super::build::Table;
 use super::origin::Origin;
 use super::place::Places;
+use super::ros2::Bag;
 use super::row::{Cell, RowColumn};
 use super::{ReadOptions, Recording, TIME_ROLE};
 use crate::outcome::Failure;
@@ -43,6 +44,7 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
     let mut other_topics = BTreeSet::new();
     let mut table: Option<Table> = None;
     let mut number = 0;
+    let mut bag = Bag::new(options);
     let mut records = Records::new(data);
     let mut channels = ChannelAccumulator::default();
     loop {
@@ -55,7 +57,8 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
         let record = match records.next() {
             Ok(Some(record)) => record,
             Ok(None) => break,
-            Err(McapError::UnexpectedEof) if table.is_some() => {
+            Err(McapError::UnexpectedEof) if table.is_some() || bag.table.is_some() => {
+                number = number.max(bag.messages);
                 origin.notes.push(format!(
                     "{}: the file ends early; the {number} whole samples before the end were used",
                     origin.source
@@ -86,6 +89,13 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
         let channel = channels
             .get(header.channel_id)
             .ok_or_else(|| damaged(McapError::UnknownChannel(header.sequence, header.channel_id)))?;
+        if channel.topic != TOPIC && bag.takes(&channel) {
+            bag.add(&channel, &header, &message).map_err(|reason| {
+                let place = bag.places.describe_number(&origin.source, bag.messages);
+                Failure::bad_input(format!("{place}: {reason}"))
+            })?;
+            continue;
+        }
         if channel.topic != TOPIC {
             if !other_topics.contains(&channel.topic) {
                 other_topics.insert(channel.topic.clone());
@@ -117,6 +127,19 @@ pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Re
     origin.passed_over = other_topics.into_iter().collect();
     if let Some(table) = table {
         return origin.finish(table);
+    }
+    if let Some(table) = bag.table {
+        if bag.of_others > 0 {
+            let (others, all) = (bag.of_others, bag.messages);
+            let note = format!("{others} of {all} messages are of other joints; they were passed over");
+            origin.notes.push(format!("{}: {note}", origin.source));
+        }
+        origin.places = bag.places;
+        return origin.finish(table);
+    }
+    if let Some(lacking) = bag.lacking() {
+        let reason = format!("no message has `{lacking}`, which the rig maps; correct [recording.columns]");
+        return Err(Failure::bad_input(format!("{}: {reason}", origin.source)));
     }
     let others = match origin.passed_over.as_slice() {
         [] => "no message at all".to_owned(),

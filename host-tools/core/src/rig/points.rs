@@ -97,7 +97,7 @@ fn channel(section: &Section, port: Port) -> Result<Option<Channel>, Failure> {
         (None, Port::Reading) => Err(section.lacks("channel", "the column role of the sensor")),
         (None, _) => Ok(None),
         (Some((name, span)), Port::Reading) => Channel::from_role(name).map(Some).ok_or_else(|| {
-            let names = Channel::ALL.into_iter().map(|channel| channel.role());
+            let names = Channel::ALL.into_iter().map(Channel::role);
             section.source.at(&span, format!("unknown channel `{name}`; {}", advice(name, names)))
         }),
         (Some((_, span)), _) => {
@@ -179,7 +179,7 @@ pub(super) fn insert(document: &mut DocumentMut, law: &Hypothesis, active: &Acti
     entry.insert("name", toml_edit::value(law.name()));
     entry.insert("component", toml_edit::value(law.descriptor().component.name()));
     entry.insert("port", toml_edit::value(law.port().name()));
-    let names = Array::from_iter(variables.iter().map(|variable| variable.name()));
+    let names = variables.iter().map(|variable| variable.name()).collect::<Array>();
     entry.insert("variables", Item::Value(Value::Array(names)));
     if let Some(channel) = active.target.name() {
         entry.insert("channel", toml_edit::value(channel));
@@ -198,7 +198,7 @@ pub(super) fn insert(document: &mut DocumentMut, law: &Hypothesis, active: &Acti
 fn listed(table: &Table) -> Array {
     let mut points = Array::new();
     let mut push = |numbers: &[f64]| {
-        let mut point = Value::Array(Array::from_iter(numbers.iter().copied()));
+        let mut point = Value::Array(numbers.iter().copied().collect());
         point.decor_mut().set_prefix("\n    ");
         points.push_formatted(point);
     };

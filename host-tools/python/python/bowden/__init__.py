@@ -16,6 +16,7 @@ SI units throughout; the unit is in the name. `bowden.plots` draws with matplotl
 from bowden.diagnosis import Diagnosis, Trace
 from bowden.errors import Error, InputError, RepairedWarning, StoppedEarlyWarning
 from bowden.hypothesis import Coefficient, Hypothesis
+from bowden.neighbours import Imported, Mapped, export_mujoco, rig_from_mujoco, rig_from_urdf
 from bowden.progress import ProgressLike
 from bowden.recording import UNITS, Frame, Recording, RecordingLike
 from bowden.results import (
@@ -57,10 +58,12 @@ __all__ = [
     "FreeForm",
     "HeldOutLoss",
     "Hypothesis",
+    "Imported",
     "InputError",
     "Law",
     "MapAxis",
     "MapChannel",
+    "Mapped",
     "Mismatch",
     "Motion",
     "ProgressLike",
@@ -81,8 +84,11 @@ __all__ = [
     "TriedHypothesis",
     "Unexplained",
     "diagnose",
+    "export_mujoco",
     "fit",
     "replay",
+    "rig_from_mujoco",
+    "rig_from_urdf",
     "simulate",
     "survey",
 ]

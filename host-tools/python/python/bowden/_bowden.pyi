@@ -18,7 +18,9 @@ __all__ = [
     "channels",
     "diagnose",
     "fit",
+    "mujoco_model",
     "replay",
+    "rig_of_model",
     "simulate",
     "survey_one",
     "survey_page",
@@ -130,6 +132,12 @@ def diagnose(
 def fit(
     study: NativeStudy, watcher: _Watcher | None = None, jobs: int | None = None
 ) -> tuple[str, list[NativeRig]]: ...
+def mujoco_model(
+    rig: NativeRig, into: _Path | None = None, joint: str | None = None
+) -> tuple[str, list[tuple[int | None, str, str, bool]]]: ...
+def rig_of_model(
+    kind: str, path: _Path, joint: str, base: NativeRig
+) -> tuple[NativeRig, float, list[tuple[int | None, str, str, bool]]]: ...
 def replay(rig: NativeRig, recording: NativeRecording) -> NativeRecording: ...
 def simulate(
     rig: NativeRig,
