@@ -4,8 +4,9 @@
 //! 2. What is left is placed: channel, component, regime.
 //! 3. Every effect of the catalogue is tried: simulated at several starting points, ranked, the best refitted together
 //!    with all nominal parameters.
-//! 4. An effect is named only if it improves held-out data by more than the difference that any two realities have.
-//! 5. The named physics is fitted once more to all data and written as a rig file.
+//! 4. An effect is named only if it takes more off the loss than what any two realities differ by.
+//! 5. The named physics is fitted once more at the rig's own resolution and written as a rig file.
+//! 6. What is held out has taken no part so far, and judges the result.
 
 mod afterwards;
 mod candidates;
@@ -60,8 +61,8 @@ use policy::POLICY;
 use selection::{Attempted, Chosen, Round, Selected, Tried, select};
 use stages::{Stage, Stages};
 use verdict::{
-    Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, HeldOutLoss, NamedEffect, OrdinaryEffect,
-    Recalibrated, SCHEMA, SearchRound, Trace, Unexplained,
+    Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, OrdinaryEffect, Recalibrated,
+    SCHEMA, SearchRound, Trace, TriedHypothesis, Unexplained,
 };
 
 /// Contacts of each tendon while candidates are tried: as many as keep the trapezoidal error `(μK)² / 12 n²` of its
@@ -178,8 +179,9 @@ fn diagnose_asked(
     let training: Vec<&Recording> =
         study.recordings_as(Role::Training).chain(experiments.iter().copied()).collect();
     let heldout = study.recordings_as(Role::HeldOut).collect();
-    let objective = Objective::of(&model, study.observed(&model)?)?;
-    judged(&objective, &training)?;
+    let judge = Objective::of(&model, study.observed(&model)?)?;
+    judged(&judge, &training)?;
+    let [objective, _] = judge.split();
     let benches: Result<Vec<(&Bench, Variation)>, Failure> = study
         .benches
         .iter()
@@ -193,6 +195,7 @@ fn diagnose_asked(
         partly: experiments,
         heldout,
         objective: &objective,
+        judge: &judge,
         model: &model,
         benches: benches?,
         allowed,
@@ -219,9 +222,9 @@ fn judged(objective: &Objective, training: &[&Recording]) -> Result<(), Failure>
 impl Case<'_> {
     /// The whole diagnosis.
     fn diagnosed(&self, asked: &Asked, progress: &dyn Progress) -> Result<Diagnosed, Failure> {
-        let Self { objective, model, .. } = *self;
+        let Self { objective, judge, model, .. } = *self;
         let mut selected = select(objective, &at_search_resolution(model, model), asked, progress)?;
-        let before = Stage::of(objective, model)?;
+        let before = Stage::of(judge, model)?;
         progress.stage("refining", 0);
         let rounds: &[f64] = if selected.complete && !self.tensions_unseen() { &[FINE_STEP] } else { &[] };
         let refined =
@@ -233,33 +236,31 @@ impl Case<'_> {
             selected = fewer;
             last = refined(&selected.model)?;
         }
-        let recalibrated = Stage::of(objective, &at_full_resolution(&selected.baseline.model, model))?;
+        let recalibrated = Stage::of(judge, &at_full_resolution(&selected.baseline.model, model))?;
         if selected.complete
             && !selected.chosen.is_empty()
             && !POLICY.pays(
-                recalibrated.heldout_loss(objective),
-                objective.mean_loss(&last.residuals, Part::HeldOut),
+                recalibrated.loss(judge, Part::Training),
+                objective.mean_loss(&last.residuals, Part::Training),
             )
         {
             selected = selected.withdrawn();
             last = refined(&selected.model)?;
         }
-        let mut inconstant = None;
-        if selected.chosen.is_empty() {
-            inconstant = constancy::inconstant(objective, &before.residuals, &last.residuals);
-            if inconstant.is_some() {
-                last = refine(objective, model, model, &[])?;
-            }
-        }
-        let unexplained = match inconstant {
-            Some(inconstant) => Some(inconstant),
-            None => unexplained::unexplained(objective, &selected.searched)?,
-        };
+        let [_, judging] = judge.split();
+        let judging = (judging.recordings() > 0).then_some(&judging);
+        let mut unexplained = unexplained::unexplained(objective, judging, &selected.searched)?;
         let hums = if selected.complete { self.add_hums(&mut last.model)? } else { Vec::new() };
-        let stages = Stages { before, recalibrated, after: Stage::of(objective, &last.model)? };
-        let traces = stages::traces(objective, model, &last.model)?;
+        let stages = Stages { before, recalibrated, after: Stage::of(judge, &last.model)? };
+        if selected.chosen.is_empty()
+            && let Some(inconstant) =
+                constancy::inconstant(judge, &stages.before.residuals, &stages.after.residuals)
+        {
+            unexplained = Some(inconstant);
+        }
+        let traces = stages::traces(judge, model, &last.model)?;
         let left = Left { hums, unexplained };
-        Ok(self.report(&selected, &last, &stages, left, traces))
+        self.report(&selected, &last, &stages, left, traces)
     }
 }
 
@@ -273,7 +274,8 @@ fn search_elements(model: &JointModel) -> usize {
 
 /// What has no name.
 struct Left {
-    hums: Vec<Hum>,
+    /// Hum of sensors, and what is left of the channel on held-out data without and with it.
+    hums: Vec<(Hum, [f64; 2])>,
     unexplained: Option<Unexplained>,
 }
 
@@ -287,7 +289,10 @@ struct Case<'a> {
     /// Those of `training` of which stretches are held out although others are held out as a whole.
     partly: Vec<&'a Recording>,
     heldout: Vec<&'a Recording>,
+    /// What is learned from.
     objective: &'a Objective,
+    /// The same and the recordings that only judge; its residuals begin with those of `objective`.
+    judge: &'a Objective,
     /// The joint that all recordings share, as the first rig states it.
     model: &'a JointModel,
     /// The benches, and what turns the shared joint into each.
@@ -340,11 +345,22 @@ impl Case<'_> {
     }
 
     /// Adds the hum of sensors that `model` leaves.
-    fn add_hums(&self, model: &mut JointModel) -> Result<Vec<Hum>, Failure> {
-        let mut found = hum::hums(self.objective, &self.objective.predict(model)?);
+    fn add_hums(&self, model: &mut JointModel) -> Result<Vec<(Hum, [f64; 2])>, Failure> {
+        let predictions = self.judge.predict(model)?;
+        let mut found = hum::hums(self.objective, &predictions);
         found.truncate(MAX_ACTIVE.saturating_sub(model.effects.len()));
         model.effects.extend(found.iter().map(|hum| hum.law));
-        Ok(found)
+        Ok(found.into_iter().map(|hum| (hum, hum.heldout(self.judge, &predictions))).collect())
+    }
+
+    /// Held-out losses without and with an effect, as the search compared them.
+    fn heldout_losses(&self, chosen: &Chosen) -> Result<[f64; 2], Failure> {
+        let [without, with] = &chosen.compared;
+        Ok([self.heldout_loss(without)?, self.heldout_loss(with)?])
+    }
+
+    fn heldout_loss(&self, model: &JointModel) -> Result<f64, Failure> {
+        Ok(self.judge.mean_loss(&self.judge.residuals(model)?, Part::HeldOut))
     }
 
     /// Whether the joint has tendons of which no recording holds a tension.
@@ -367,8 +383,8 @@ impl Case<'_> {
         stages: &Stages,
         Left { hums, unexplained }: Left,
         traces: Vec<Trace>,
-    ) -> Diagnosed {
-        let Self { rig, objective, model, .. } = *self;
+    ) -> Result<Diagnosed, Failure> {
+        let Self { rig, objective, judge, model, .. } = *self;
         let (training, heldout) = (&self.training, &self.heldout);
         let nominal = Layout::of(model).calibrated(model);
         let recalibrated_parameters: Vec<Recalibrated> = nominal
@@ -388,7 +404,7 @@ impl Case<'_> {
         let own = model.effects.len();
         let clock_s = objective.duration_s();
         let mut first_value = nominal.len();
-        let shown = Shown::by(&training.iter().chain(heldout).copied().collect::<Vec<_>>());
+        let shown = Shown::by(training);
         let bearable = Bearable { shown, allowed: self.allowed, scales: objective.scales() };
         let mut experiments = Vec::new();
         let mut effects: Vec<(ActiveEffect, NamedEffect)> = Vec::new();
@@ -398,14 +414,19 @@ impl Case<'_> {
             let count = Free::of_effect(&last.model, own + index).len();
             let values = first_value..first_value + count;
             first_value += Layout::of_found(&last.model, own + index).len();
+            let heldout = self.heldout_losses(chosen)?;
             if let Some(law) = law::of(&active) {
-                let losses = [chosen.loss_before, chosen.loss_after];
-                laws.push((stated_laws::stated(law, &active, losses, &last.stds[values]), active));
+                let improvement = improvement([chosen.loss_before, chosen.loss_after]);
+                laws.push((
+                    stated_laws::stated(law, &active, heldout, improvement, &last.stds[values]),
+                    active,
+                ));
                 continue;
             }
             if let Some(hypothesis) = hypothesis::of(&active) {
-                let losses = [chosen.loss_before, chosen.loss_after];
-                laws.push((hypotheses::stated(hypothesis, &active, losses, &last.stds[values]), active));
+                let improvement = improvement([chosen.loss_before, chosen.loss_after]);
+                let stds = &last.stds[values];
+                laws.push((hypotheses::stated(hypothesis, &active, heldout, improvement, stds), active));
                 continue;
             }
             if let Some((_, named)) = effects.iter_mut().find(|(other, _)| other.is_beside(&active)) {
@@ -418,26 +439,26 @@ impl Case<'_> {
                 experiments.push(found);
                 Some(words)
             };
-            effects.push((active, named(active, chosen, &last.stds[values], objective, separate)));
+            effects.push((active, named(active, chosen, heldout, &last.stds[values], objective, separate)));
         }
         let mut effects: Vec<NamedEffect> =
             effects.into_iter().map(|(active, named)| strongest_first(&active, named)).collect();
-        laws.extend(hums.iter().filter_map(|hum| Some((hum.stated()?, hum.law))));
-        let mismatch = place::mismatch(objective, &stages.recalibrated.residuals);
+        laws.extend(hums.iter().filter_map(|(hum, heldout)| Some((hum.stated(*heldout)?, hum.law))));
+        let mismatch = place::mismatch(judge, &stages.recalibrated.residuals);
         let unexplained = stated_laws::unexplained(&laws, unexplained, &mismatch);
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let wrong = recalibrated_parameters.iter().any(Recalibrated::is_wrong);
-        let [loss_before, loss_recalibrated, loss_after] =
-            [&stages.before, &stages.recalibrated, &stages.after].map(|stage| stage.heldout_loss(objective));
+        let [heldout_loss, training_loss] =
+            [Part::HeldOut, Part::Training].map(|part| stages.loss(judge, part));
         let evidence = Evidence {
             names: effects.len(),
             structure_is_left: unexplained.is_some(),
             parameters_are_wrong: wrong,
-            loss_before,
-            loss_recalibrated,
+            loss_before: training_loss.before,
+            loss_recalibrated: training_loss.recalibrated,
         };
         let verdict = decide(&evidence, &POLICY);
-        let channels: BTreeMap<String, ChannelFit> = objective
+        let channels: BTreeMap<String, ChannelFit> = judge
             .scales()
             .iter()
             .enumerate()
@@ -446,18 +467,13 @@ impl Case<'_> {
                     before_rmse: stages.before.heldout_rmse[place],
                     recalibrated_rmse: stages.recalibrated.heldout_rmse[place],
                     after_rmse: stages.after.heldout_rmse[place],
-                    noise_rmse: objective.noise_variance(*series).sqrt(),
+                    noise_rmse: judge.noise_variance(*series).sqrt(),
                 };
                 (series.name().to_owned(), fit)
             })
             .collect();
-        let summary = words::summary(
-            verdict,
-            &effects,
-            &recalibrated_parameters,
-            !laws.is_empty(),
-            [loss_recalibrated, loss_after],
-        );
+        let summary =
+            words::summary(verdict, &effects, &recalibrated_parameters, !laws.is_empty(), &heldout_loss);
         let coarse = at_search_resolution(&last.model, model);
         let mut indistinguishable =
             crate::fit::identifiability::indistinguishable(objective, &coarse).unwrap_or_default();
@@ -476,6 +492,11 @@ impl Case<'_> {
                 }
             }
         }
+        let trials = selected.trials.iter();
+        let hypotheses: Result<Vec<TriedHypothesis>, Failure> = trials
+            .map(|trial| hypotheses::tried(trial, selected, |model| self.heldout_loss(model)))
+            .collect();
+        let hypotheses = hypotheses?;
         let diagnosis = Diagnosis {
             schema: SCHEMA.to_owned(),
             verdict,
@@ -485,16 +506,13 @@ impl Case<'_> {
             recalibrated: recalibrated_parameters,
             indistinguishable,
             mismatch,
-            residual_map: residual_map::residual_map(objective, stages),
+            residual_map: residual_map::residual_map(judge, stages),
             unexplained,
-            hypotheses: selected.trials.iter().map(|trial| hypotheses::tried(trial, selected)).collect(),
+            hypotheses,
             laws: laws.into_iter().map(|(law, _)| law).collect(),
             fit: Fit { heldout: true, channels },
-            heldout_loss: HeldOutLoss {
-                before: loss_before,
-                recalibrated: loss_recalibrated,
-                after: loss_after,
-            },
+            heldout_loss,
+            training_loss,
             ordinary: selected
                 .ordinary
                 .iter()
@@ -516,24 +534,30 @@ impl Case<'_> {
             },
             written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
         };
-        Diagnosed {
-            findings: Findings { diagnosis, traces, regimes: regimes::regimes(objective, stages) },
-            experiments,
-            now,
-        }
+        let regimes = regimes::regimes(judge, stages);
+        Ok(Diagnosed { findings: Findings { diagnosis, traces, regimes }, experiments, now })
     }
+}
+
+/// Part of the loss that is removed from the first to the second.
+fn improvement([without, with]: [f64; 2]) -> f64 {
+    1.0 - with / without
 }
 
 fn named(
     active: ActiveEffect,
     chosen: &Chosen,
+    heldout: [f64; 2],
     stds: &[Option<f64>],
     objective: &Objective,
     separate: impl FnMut(&Tried) -> Option<String>,
 ) -> NamedEffect {
     let descriptor = active.descriptor();
-    let improvement = 1.0 - chosen.loss_after / chosen.loss_before;
-    let (probability, rivals) = words::rivals(chosen, improvement, separate);
+    let heldout_improvement = improvement(heldout);
+    let training_improvement = improvement([chosen.loss_before, chosen.loss_after]);
+    // Held-out data that do not show it leave it as likely as not.
+    let (probability, rivals) =
+        words::rivals(chosen, training_improvement.min(heldout_improvement), separate);
     let onset_s = descriptor
         .parameters
         .iter()
@@ -547,8 +571,9 @@ fn named(
         channel: active.target.name().map(str::to_owned),
         parameters: estimates(&active, stds),
         further: Vec::new(),
-        heldout_improvement: improvement,
-        sentence: words::sentence(&active, improvement, objective.duration_s()),
+        heldout_improvement,
+        training_improvement,
+        sentence: words::sentence(&active, heldout_improvement, objective.duration_s()),
         rivals,
     }
 }
@@ -590,12 +615,12 @@ fn values_of(effect: &ActiveEffect) -> BTreeMap<String, f64> {
 }
 
 fn search_round(round: &Round) -> SearchRound {
-    let attempt = |Attempted { effect, promised, heldout_loss }: &Attempted| Attempt {
+    let attempt = |Attempted { effect, promised, loss }: &Attempted| Attempt {
         id: effect.descriptor().id.to_owned(),
         channel: effect.target.name().map(str::to_owned),
         parameters: values_of(effect),
         promised: *promised,
-        heldout_loss: *heldout_loss,
+        loss: *loss,
     };
     SearchRound { loss_before: round.loss_before, tried: round.candidates.iter().map(attempt).collect() }
 }

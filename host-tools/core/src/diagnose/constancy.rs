@@ -27,8 +27,7 @@ pub(super) fn inconstant(
     let (series, _) = worse.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let sentence = format!(
         "Parameters fitted to the recordings predict held-out data worse than those of the rig file (loss {moved:.2} \
-         instead of {kept:.2}), most in {}: the bench changed in between, or the model lacks something that they made up for. \
-         The values of the rig file are kept.",
+         instead of {kept:.2}), most in {}: the bench changed in between, or the model lacks something that they made up for.",
         series.name()
     );
     Some(Unexplained {

@@ -12,9 +12,9 @@ pub struct Evidence {
     pub structure_is_left: bool,
     /// Whether the rig file is wrong about a parameter.
     pub parameters_are_wrong: bool,
-    /// Held-out loss with the rig as it was.
+    /// Loss with the rig as it was.
     pub loss_before: f64,
-    /// Held-out loss with nominal parameters recalibrated.
+    /// Loss with nominal parameters recalibrated.
     pub loss_recalibrated: f64,
 }
 

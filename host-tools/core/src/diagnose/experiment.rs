@@ -286,8 +286,10 @@ mod tests {
         let model = JointModel { elements: 8, ..JointModel::from_rig(&rig, &recording).unwrap() };
         let with = |effect| (effect, JointModel { effects: vec![effect], ..model.clone() });
         let ((effect, named), (other, rival)) = (with(by_default(named)), with(rival));
-        let chosen = Chosen { effect, model: named, loss_before: 2.0, loss_after: 1.0, others: Vec::new() };
-        let tried = Tried { effect: other, model: rival, heldout_loss: 1.1 };
+        let compared = [model.clone(), named.clone()];
+        let others = Vec::new();
+        let chosen = Chosen { effect, model: named, loss_before: 2.0, loss_after: 1.0, compared, others };
+        let tried = Tried { effect: other, model: rival, loss: 1.1 };
         separating(&rig, &chosen, &tried, bearable, 40.0)
     }
 

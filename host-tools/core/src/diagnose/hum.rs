@@ -1,9 +1,9 @@
 //! Hum: oscillations of single sensors that are faster than the blocks of a fit resolve, such as the mains on an amplifier.
 //!
 //! A fit compares means over 50 ms, which average such an oscillation away, and of the rest only how strong it is. Here what is
-//! left of every channel is searched sample by sample: a line in its spectrum (Fourier transform of the training samples of the
-//! longest recording), then amplitude and phase by linear least squares over the bench's clock, judged on the samples that no fit
-//! has seen.
+//! left of every channel is searched sample by sample: a line in its spectrum (Fourier transform of a part of the training samples of
+//! the longest recording), then amplitude and phase by linear least squares over the bench's clock, confirmed on the other training
+//! samples, fitted once more to both, and judged on what is held out.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ use realfft::RealFftPlanner;
 use super::stated_laws::stated;
 use super::unexplained::shape::{Rows, best_rate};
 use super::verdict::FoundLaw;
-use crate::fit::objective::{Objective, Part, Series};
+use crate::fit::objective::{Block, Objective, Part, Series};
 use crate::simulation::Prediction;
 
 /// Lowest frequency, Hz: slower swings show in the means over 10 ms that other searches use.
@@ -47,15 +47,32 @@ pub(super) struct Hum {
     pub law: ActiveEffect,
     /// Standard deviations of its coefficients.
     pub stds: [f64; 3],
-    /// Mean square of what is left of the channel on held-out samples without and with it, in its unit squared.
-    pub heldout: [f64; 2],
+    channel: Channel,
+    /// Of sine and cosine over the bench's clock.
+    amplitudes: [f64; 2],
+    /// Part that it takes off the mean square of the training samples.
+    taken_off: f64,
 }
 
 impl Hum {
+    /// Mean square of what is left of the channel on held-out samples without and with it, in its unit squared. `predictions` are those of
+    /// a model without it.
+    pub(super) fn heldout(&self, objective: &Objective, predictions: &[Prediction]) -> [f64; 2] {
+        let is_heldout = |block: &Block| block.part == Part::HeldOut;
+        let recordings = 0..objective.recordings();
+        let judging: Vec<BlockSamples> = recordings
+            .flat_map(|recording| {
+                BlockSamples::of(objective, predictions, self.channel, recording, is_heldout)
+            })
+            .collect();
+        let rate = TAU * self.law.parameters[1];
+        [left(&judging), rest(&judging, rate, self.amplitudes)]
+    }
+
     /// What a diagnosis says of it.
-    pub(super) fn stated(&self) -> Option<FoundLaw> {
+    pub(super) fn stated(&self, heldout: [f64; 2]) -> Option<FoundLaw> {
         let law = law::of(&self.law)?;
-        Some(stated(law, &self.law, self.heldout, &self.stds.map(Some)))
+        Some(stated(law, &self.law, heldout, self.taken_off, &self.stds.map(Some)))
     }
 }
 
@@ -70,7 +87,10 @@ struct Line {
     noise: f64,
     samples: f64,
     span_s: f64,
-    heldout: [f64; 2],
+    /// Power that it takes off training samples to which it was not fitted, over its own.
+    confirmed: f64,
+    /// Part that it takes off the mean square of those to which it was fitted.
+    taken_off: f64,
 }
 
 /// Lines of sensors, loudest over its noise first. What swings in an angle, or in several channels otherwise than together, is a motion of
@@ -112,12 +132,13 @@ struct BlockSamples {
 }
 
 impl BlockSamples {
-    /// Those of one recording that belong to `part`, block by block.
+    /// Those of one recording, block by block.
     fn of(
         objective: &Objective,
         predictions: &[Prediction],
         channel: Channel,
-        (recording, part): (usize, Part),
+        recording: usize,
+        is_one: impl Fn(&Block) -> bool,
     ) -> Vec<Self> {
         let Some(measured) = objective.measured(recording, Series::Channel(channel)) else {
             return Vec::new();
@@ -125,7 +146,7 @@ impl BlockSamples {
         let Some(predicted) = predictions[recording].channel(channel) else { return Vec::new() };
         let input = objective.input(recording);
         let offset_s = input.clock_s()[0] - input.t_s()[0];
-        let blocks = objective.blocks(recording).iter().filter(|block| block.part == part);
+        let blocks = objective.blocks(recording).iter().filter(|block| is_one(block));
         let samples = blocks.map(|block| {
             let samples = block.start..block.end;
             let left = samples.clone().map(|k| measured[k] - predicted[k]).collect();
@@ -171,40 +192,61 @@ fn line(
     channels: usize,
 ) -> Option<Line> {
     let recordings = 0..objective.recordings();
-    let of = |recording, part| BlockSamples::of(objective, predictions, channel, (recording, part));
+    let is_trained = |block: &Block| block.part == Part::Training;
+    let of = |recording, confirms: bool| {
+        BlockSamples::of(objective, predictions, channel, recording, |block| {
+            is_trained(block) && block.confirms() == confirms
+        })
+    };
     let count = |samples: &[BlockSamples]| samples.iter().map(|block| block.left.len()).sum::<usize>();
     let trained = |recording: &usize| -> usize {
-        let blocks = objective.blocks(*recording).iter().filter(|block| block.part == Part::Training);
+        let blocks = objective.blocks(*recording).iter().filter(|block| is_trained(block));
         blocks.map(|block| block.end - block.start).sum()
     };
     let measured = |recording: &usize| objective.measured(*recording, Series::Channel(channel)).is_some();
     let longest = recordings.clone().filter(measured).max_by_key(trained)?;
-    let fitted_to = of(longest, Part::Training);
+    let mut fitted_to = of(longest, false);
     let t_s = objective.input(longest).t_s();
     let span_s = t_s[t_s.len() - 1] - t_s[0];
     let rate_hz = (t_s.len() - 1) as f64 / span_s;
     let rough_hz = peak_hz(&fitted_to, t_s.len(), rate_hz, channels)?;
-    let table = Rows {
-        x: fitted_to.iter().flat_map(|block| &block.clock_s).copied().collect(),
-        values: fitted_to.iter().flat_map(|block| &block.left).copied().collect(),
-        weights: vec![1.0; count(&fitted_to)],
-    };
     let beside = TAU / span_s;
-    let rate = best_rate(&table, (TAU * rough_hz - beside, TAU * rough_hz + beside), 0.1 * beside)?;
-    let amplitudes = fitted(&fitted_to, rate)?;
-    let judged: Vec<BlockSamples> = recordings.flat_map(|recording| of(recording, Part::HeldOut)).collect();
-    let left = |blocks: &[BlockSamples]| mean_square(blocks.iter().flat_map(|block| &block.left).copied());
-    let rest =
-        |blocks: &[BlockSamples]| mean_square(blocks.iter().flat_map(|block| block.rest(rate, amplitudes)));
+    let in_phase = |blocks: &[BlockSamples]| {
+        let table = Rows {
+            x: blocks.iter().flat_map(|block| &block.clock_s).copied().collect(),
+            values: blocks.iter().flat_map(|block| &block.left).copied().collect(),
+            weights: vec![1.0; count(blocks)],
+        };
+        let rate = best_rate(&table, (TAU * rough_hz - beside, TAU * rough_hz + beside), 0.1 * beside)?;
+        Some((rate, fitted(blocks, rate)?))
+    };
+    let (rate, amplitudes) = in_phase(&fitted_to)?;
+    let confirming: Vec<BlockSamples> = recordings.flat_map(|recording| of(recording, true)).collect();
+    let taken_off = left(&confirming) - rest(&confirming, rate, amplitudes);
+    let [sine, cosine] = amplitudes;
+    let confirmed = taken_off / (0.5 * (sine * sine + cosine * cosine));
+    fitted_to.extend(of(longest, true));
+    let (rate, amplitudes) = in_phase(&fitted_to)?;
     Some(Line {
         channel,
         frequency_hz: rate / TAU,
         amplitudes,
-        noise: rest(&fitted_to).sqrt(),
+        taken_off: 1.0 - rest(&fitted_to, rate, amplitudes) / left(&fitted_to),
+        noise: rest(&fitted_to, rate, amplitudes).sqrt(),
         samples: count(&fitted_to) as f64,
         span_s,
-        heldout: [left(&judged), rest(&judged)],
+        confirmed,
     })
+}
+
+/// Mean square of what is left.
+fn left(blocks: &[BlockSamples]) -> f64 {
+    mean_square(blocks.iter().flat_map(|block| &block.left).copied())
+}
+
+/// Mean square of what a line leaves of it.
+fn rest(blocks: &[BlockSamples], rate: f64, amplitudes: [f64; 2]) -> f64 {
+    mean_square(blocks.iter().flat_map(|block| block.rest(rate, amplitudes)))
 }
 
 /// Frequency of the highest line above [`LOWEST_HZ`], if noise alone hardly makes one so high: the power of white noise is distributed
@@ -270,8 +312,7 @@ impl Line {
     }
 
     fn is_confirmed(&self) -> bool {
-        let [before, after] = self.heldout;
-        before - after > CONFIRMED * 0.5 * self.amplitude().powi(2)
+        self.confirmed > CONFIRMED
     }
 
     /// The law, with the standard deviations of a sine in white noise (Rife and Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591):
@@ -288,7 +329,9 @@ impl Line {
             / (std::f64::consts::PI * amplitude * self.span_s * self.samples.sqrt());
         // The phase is told at the clock's zero, half the recording away from its middle.
         let of_phase_rad = 2.0 * of_amplitude / amplitude;
-        Some(Hum { law, stds: [of_amplitude, of_frequency_hz, of_phase_rad], heldout: self.heldout })
+        let stds = [of_amplitude, of_frequency_hz, of_phase_rad];
+        let Self { channel, amplitudes, taken_off, .. } = *self;
+        Some(Hum { law, stds, channel, amplitudes, taken_off })
     }
 }
 
@@ -306,7 +349,7 @@ mod tests {
     const NOISE_N: f64 = 0.3;
 
     /// What a bench whose tensions carry noise and the given swings (channel, amplitude, frequency, phase) is left with.
-    fn found(seed: u64, swings: &[(Channel, f64, f64, f64)]) -> Vec<Hum> {
+    fn found(seed: u64, swings: &[(Channel, f64, f64, f64)]) -> Vec<(Hum, [f64; 2])> {
         let mut recording: Recording = test_bench::swung(12_000);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let input = crate::simulation::ReplayInput::new(&model, &recording).unwrap();
@@ -325,20 +368,20 @@ mod tests {
         }
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let predictions = objective.predict(&model).unwrap();
-        hums(&objective, &predictions)
+        let found = hums(&objective, &predictions);
+        found.iter().map(|hum| (*hum, hum.heldout(&objective, &predictions))).collect()
     }
 
     #[test]
     fn mains_on_one_amplifier_are_found_with_amplitude_frequency_and_phase() {
         let hums = found(1, &[(Channel::F3, 0.9, 50.02, 0.7)]);
-        let [hum] = &hums[..] else { panic!("{hums:?}") };
+        let [(hum, [before, after])] = &hums[..] else { panic!("{hums:?}") };
         assert_eq!(hum.law.target, Target::One(Channel::F3));
         for ((value, want), std) in hum.law.parameters.iter().zip([0.9, 50.02, 0.7]).zip(hum.stds) {
             assert!((value - want).abs() < 4.0 * std, "{value} ± {std}, expected {want}");
         }
         // 12 s at 1 kHz, two thirds of them fitted.
         assert!(hum.stds[0] < 0.006 && hum.stds[1] < 0.001, "{:?}", hum.stds);
-        let [before, after] = hum.heldout;
         assert!((before - after - 0.405).abs() < 0.03, "{before} to {after}");
     }
 

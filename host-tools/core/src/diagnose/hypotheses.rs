@@ -5,10 +5,10 @@ use std::fmt::Write;
 use bowden_model::effect::{ActiveEffect, Effect};
 
 use super::candidates::{Candidate, fits};
-use super::selection::{Selected, Trial};
+use super::selection::{BestRival, Selected, Trial};
 use super::stated_laws::{coefficients, in_numbers, looseness};
 use super::verdict::{FoundLaw, RivalLoss, TriedHypothesis};
-use super::words::short;
+use super::words::{on_unseen_data, short};
 use crate::fit::objective::Objective;
 use crate::hypothesis::Hypothesis;
 use crate::joint_model::JointModel;
@@ -108,6 +108,7 @@ pub(super) fn stated(
     hypothesis: &Hypothesis,
     active: &ActiveEffect,
     [loss_before, loss_after]: [f64; 2],
+    training_improvement: f64,
     stds: &[Option<f64>],
 ) -> FoundLaw {
     let heldout_improvement = 1.0 - loss_after / loss_before;
@@ -119,14 +120,15 @@ pub(super) fn stated(
         formula: hypothesis.formula(),
         coefficients: coefficients(active, stds),
         heldout_improvement,
+        training_improvement,
         sentence: String::new(),
     };
     let strength = active.descriptor().parameters.first().map_or("", |spec| spec.name);
     found.sentence = format!(
-        "Hypothesis {}: {}. It removes {:.0} % of the difference on data the fit did not see.{}",
+        "Hypothesis {}: {}. It {}.{}",
         hypothesis.name(),
         in_numbers(&found),
-        100.0 * heldout_improvement,
+        on_unseen_data(heldout_improvement),
         looseness(&found, strength)
     );
     found
@@ -136,43 +138,60 @@ fn names_of(hypothesis: &Hypothesis) -> Vec<String> {
     hypothesis.variables().iter().map(|variable| variable.name().to_owned()).collect()
 }
 
-/// What is said of a hypothesis by itself.
-pub(super) fn tried(trial: &Trial, selected: &Selected) -> TriedHypothesis {
-    let Trial { hypothesis, effect, stds, loss_without, loss, rivals } = trial;
+/// What is said of a hypothesis by itself; `heldout_loss` judges a model.
+///
+/// # Errors
+/// When a model cannot be driven.
+pub(super) fn tried(
+    trial: &Trial,
+    selected: &Selected,
+    heldout_loss: impl Fn(&JointModel) -> Result<f64, Failure>,
+) -> Result<TriedHypothesis, Failure> {
+    let Trial { hypothesis, effect, stds, without, with, rivals, .. } = trial;
+    let loss = heldout_loss(with)?;
+    let judged = |rival: &Option<BestRival>| -> Result<Option<RivalLoss>, Failure> {
+        let Some(BestRival { id, model, .. }) = rival else { return Ok(None) };
+        Ok(Some(RivalLoss { id: id.clone(), heldout_loss: heldout_loss(model)? }))
+    };
+    let [catalogue, closed_form, free_curve] =
+        [&rivals.catalogue, &rivals.closed_form, &rivals.free_curve].map(judged);
+    let [catalogue, closed_form, free_curve] = [catalogue?, closed_form?, free_curve?];
     let descriptor = effect.descriptor();
     let found = selected.chosen.iter().any(|chosen| chosen.effect.descriptor().id == descriptor.id);
-    let beats = |rival: &Option<RivalLoss>| rival.as_ref().is_none_or(|rival| *loss < rival.heldout_loss);
-    TriedHypothesis {
+    let beats = |rival: &Option<RivalLoss>| rival.as_ref().is_none_or(|rival| loss < rival.heldout_loss);
+    let mut tried = TriedHypothesis {
         name: hypothesis.name().to_owned(),
         component: descriptor.component.name().to_owned(),
         port: hypothesis.port().name().to_owned(),
         variables: names_of(hypothesis),
         channel: effect.target.name().map(str::to_owned),
         coefficients: coefficients(effect, stds),
-        heldout_loss_without: *loss_without,
-        heldout_loss: *loss,
-        beats_catalogue: beats(&rivals.catalogue),
-        beats_closed_form: beats(&rivals.closed_form),
-        beats_free_curve: beats(&rivals.free_curve),
-        catalogue: rivals.catalogue.clone(),
-        closed_form: rivals.closed_form.clone(),
-        free_curve: rivals.free_curve.clone(),
+        heldout_loss_without: heldout_loss(without)?,
+        heldout_loss: loss,
+        beats_catalogue: beats(&catalogue),
+        beats_closed_form: beats(&closed_form),
+        beats_free_curve: beats(&free_curve),
+        catalogue,
+        closed_form,
+        free_curve,
         found,
-        sentence: sentence(trial, found),
-    }
+        sentence: String::new(),
+    };
+    tried.sentence = sentence(&tried);
+    Ok(tried)
 }
 
-fn sentence(trial: &Trial, found: bool) -> String {
+fn sentence(tried: &TriedHypothesis) -> String {
     let mut text = format!(
         "Beside the recalibrated rig, {} brings the held-out loss from {} to {}",
-        trial.hypothesis.name(),
-        short(trial.loss_without),
-        short(trial.loss)
+        tried.name,
+        short(tried.heldout_loss_without),
+        short(tried.heldout_loss)
     );
     let rivals = [
-        ("the best effect of the catalogue", &trial.rivals.catalogue),
-        ("the best closed form", &trial.rivals.closed_form),
-        ("the best free curve, over", &trial.rivals.free_curve),
+        ("the best effect of the catalogue", &tried.catalogue),
+        ("the best closed form", &tried.closed_form),
+        ("the best free curve, over", &tried.free_curve),
     ];
     for (what, rival) in rivals {
         // Writing to a String cannot fail.
@@ -181,6 +200,6 @@ fn sentence(trial: &Trial, found: bool) -> String {
             None => write!(text, "; {what} promises too little for a fit"),
         };
     }
-    let end = if found { "The diagnosed rig simulates it." } else { "It is not in the diagnosed rig." };
+    let end = if tried.found { "The diagnosed rig simulates it." } else { "It is not in the diagnosed rig." };
     format!("{text}. {end}")
 }

@@ -1,4 +1,4 @@
-//! When something is said: the numbers by which losses on held-out data become names, laws, odds and a verdict.
+//! When something is said: the numbers by which losses become names, laws, odds and a verdict.
 //!
 //! They stand in every `diagnosis.json`, so that a reader can hold the losses there against them. A loss is in squared scales: 1 where
 //! every residual is what sensor noise and an ordinary bench leave.
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// The numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Policy {
-    /// Share of the held-out loss that an effect must remove to be named: what two realities differ by is not all ordinary contact and
+    /// Share of the loss that an effect must remove to be named: what two realities differ by is not all ordinary contact and
     /// friction, and effects that imitate the rest remove a part of it.
     pub name_share: f64,
     /// Loss that an effect must remove whatever the share. On fifty virtual benches that hide nothing (`prove`, groups `nothing` and
@@ -19,20 +19,20 @@ pub struct Policy {
     /// Loss from which on more is left than noise and an ordinary bench leave: every residual beyond the three scales at which the loss
     /// bends.
     pub much_left: f64,
-    /// Advantage in held-out loss that each further parameter must earn between two candidates.
+    /// Advantage in loss that each further parameter must earn between two candidates.
     pub share_per_parameter: f64,
-    /// Share of the held-out loss that a law must remove. It is chosen among many forms with up to three coefficients each, so that more
+    /// Share of the loss that a law must remove. It is chosen among many forms with up to three coefficients each, so that more
     /// of what two realities differ by is imitated by one of them than by a name.
     pub law_share: f64,
     /// Loss that a law must remove whatever the share: where less than that is left no law is looked for.
     pub law_loss: f64,
-    /// Share of the held-out loss of the recalibrated rig that the diagnosed one must take off, for what was found to be said
-    /// (`heldout_loss` in each `diagnosis.json` of `prove`): far below it lies what imitates the rest of an ordinary bench, above it what
+    /// Share of the loss of the recalibrated rig that the diagnosed one must take off, for what was found to be said
+    /// (`training_loss` in each `diagnosis.json`): far below it lies what imitates the rest of an ordinary bench, above it what
     /// is there.
     pub paying_share: f64,
     /// Standard deviations by which a wrong parameter is off at least.
     pub sure_stds: f64,
-    /// Sharpness with which a ratio of held-out losses turns into odds: at 10 a candidate that leaves a fifth more is six times less
+    /// Sharpness with which a ratio of losses turns into odds: at 10 a candidate that leaves a fifth more is six times less
     /// likely.
     pub odds_per_loss_ratio: f64,
     /// Odds below which a rival is not listed.
@@ -57,7 +57,7 @@ pub const POLICY: Policy = Policy {
 };
 
 impl Policy {
-    /// Whether an effect that brings the held-out loss from `before` to `after` is worth naming.
+    /// Whether an effect that brings the loss from `before` to `after` is worth naming.
     ///
     /// Where what is left stands far above what an ordinary bench leaves, other physics is missing too, and what takes a little off may
     /// only imitate it: every factor of a hundred beyond `much_left` asks for `name_share` more.
@@ -67,10 +67,11 @@ impl Policy {
         before - after > self.name_loss && before - after > share * before
     }
 
-    /// Whether further instances of an effect that has its name are worth having.
+    /// Whether so many further instances of an effect that has its name are worth having.
     #[must_use]
-    pub fn worth_having(&self, before: f64, after: f64) -> bool {
-        before - after > self.name_loss && before - after > self.share_per_parameter * before
+    pub fn worth_having(&self, before: f64, after: f64, instances: usize) -> bool {
+        before - after > self.name_loss
+            && before - after > self.share_per_parameter * instances as f64 * before
     }
 
     /// Whether a law is worth stating.
@@ -79,13 +80,13 @@ impl Policy {
         before - after > self.law_loss && before - after > self.law_share * before
     }
 
-    /// Whether the diagnosed rig, which stands without what is ordinary, predicts held-out data better than the recalibrated one.
+    /// Whether the diagnosed rig, which stands without what is ordinary, fits better than the recalibrated one.
     #[must_use]
     pub fn pays(&self, recalibrated: f64, diagnosed: f64) -> bool {
         recalibrated - diagnosed > self.paying_share * recalibrated
     }
 
-    /// Factor of the held-out loss with an effect, where candidates are compared: its parameters count, and a form that is not the usual one
+    /// Factor of the loss with an effect, where candidates are compared: its parameters count, and a form that is not the usual one
     /// must be worth its choice as a name must.
     #[must_use]
     pub fn handicap(&self, parameters: usize, is_usual_form: bool) -> f64 {
@@ -93,7 +94,7 @@ impl Policy {
         (1.0 + self.share_per_parameter * parameters as f64) / (1.0 - share)
     }
 
-    /// Odds of a candidate whose held-out loss is so many times that of the named effect.
+    /// Odds of a candidate whose loss is so many times that of the named effect.
     #[must_use]
     pub fn odds(&self, loss_ratio: f64) -> f64 {
         loss_ratio.powf(-self.odds_per_loss_ratio)
@@ -105,7 +106,7 @@ impl Policy {
         odds > self.listed_odds
     }
 
-    /// Probability that anything is there at all which improves held-out data by so much.
+    /// Probability that anything is there at all which takes so much off the loss.
     #[must_use]
     pub fn presence(&self, improvement: f64) -> f64 {
         1.0 - 0.5 * (-(improvement - self.even_improvement).max(0.0) / self.even_improvement).exp()
@@ -143,8 +144,10 @@ mod tests {
     fn a_law_takes_more_than_a_name_and_an_instance_less() {
         assert!(POLICY.worth_naming(2.0, 1.6) && !POLICY.worth_stating(2.0, 1.6));
         assert!(POLICY.worth_stating(2.0, 1.3));
-        assert!(!POLICY.worth_naming(10.0, 9.0) && POLICY.worth_having(10.0, 9.0));
-        assert!(!POLICY.worth_having(10.0, 9.8));
+        assert!(!POLICY.worth_naming(10.0, 9.0) && POLICY.worth_having(10.0, 9.0, 1));
+        assert!(!POLICY.worth_having(10.0, 9.8, 1));
+        // Four of them, 3 % each.
+        assert!(!POLICY.worth_having(10.0, 9.0, 4) && POLICY.worth_having(10.0, 8.7, 4));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::fit::objective::{Objective, Part, Residuals, Series};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 
-use super::verdict::Trace;
+use super::verdict::{StageLoss, Trace};
 
 /// Samples up to which a trace is kept as it is.
 const ALL_DRAWN: usize = 100_000;
@@ -36,9 +36,9 @@ impl Stage {
         })
     }
 
-    /// Mean loss on held-out data.
-    pub fn heldout_loss(&self, objective: &Objective) -> f64 {
-        objective.mean_loss(&self.residuals, Part::HeldOut)
+    /// Mean loss over a part of the data.
+    pub fn loss(&self, objective: &Objective, part: Part) -> f64 {
+        objective.mean_loss(&self.residuals, part)
     }
 }
 
@@ -47,6 +47,17 @@ pub(crate) struct Stages {
     pub before: Stage,
     pub recalibrated: Stage,
     pub after: Stage,
+}
+
+impl Stages {
+    /// Their mean losses over a part of the data.
+    pub fn loss(&self, objective: &Objective, part: Part) -> StageLoss {
+        StageLoss {
+            before: self.before.loss(objective, part),
+            recalibrated: self.recalibrated.loss(objective, part),
+            after: self.after.loss(objective, part),
+        }
+    }
 }
 
 /// What was simulated of the first recording, to be drawn: seven digits are more than a plot shows.

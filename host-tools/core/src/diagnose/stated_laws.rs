@@ -7,13 +7,15 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::law::{self, Form, Law};
 
 use super::verdict::{Estimate, FoundLaw, Mismatch, Unexplained};
-use super::words::short;
+use super::words::{on_unseen_data, short};
 
-/// A law as it was fitted, with the losses on held-out data without and with it, and the standard deviations of its coefficients.
+/// A law as it was fitted, with the losses on held-out data without and with it, the part of the loss that it removes of the data that were
+/// fitted, and the standard deviations of its coefficients.
 pub(super) fn stated(
     law: &Law,
     active: &ActiveEffect,
     [loss_before, loss_after]: [f64; 2],
+    training_improvement: f64,
     stds: &[Option<f64>],
 ) -> FoundLaw {
     let descriptor = active.descriptor();
@@ -27,18 +29,19 @@ pub(super) fn stated(
         formula: law.formula().to_owned(),
         coefficients,
         heldout_improvement,
+        training_improvement,
         sentence: String::new(),
     };
     let mut meaning = law.port().meaning().chars();
     let first: String = meaning.next().into_iter().flat_map(char::to_uppercase).collect();
     found.sentence = format!(
-        "{first}{}{}: {}. It {} {}; it removes {:.0} % of the difference on data the fit did not see.{}",
+        "{first}{}{}: {}. It {} {}; it {}.{}",
         meaning.as_str(),
         found.channel.as_ref().map_or_else(String::new, |channel| format!(" ({channel})")),
         in_numbers(&found),
         law.form().behaviour(),
         law.variable().name(),
-        100.0 * heldout_improvement,
+        on_unseen_data(heldout_improvement),
         looseness(&found, descriptor.parameters[0].name)
     );
     found
@@ -130,7 +133,7 @@ mod tests {
         let law = LAWS.iter().find(of_power).unwrap();
         let active = ActiveEffect::with_defaults(law).with("exponent", exponent);
         let stds = active.parameters.map(|value| Some(amplitude_share * value.abs()));
-        stated(law, &active, [2.0, 1.0], &stds).sentence
+        stated(law, &active, [2.0, 1.0], 0.5, &stds).sentence
     }
 
     #[test]

@@ -22,36 +22,50 @@ use locate::Answer;
 use samples::{Left, Samples, Variable};
 use shape::{Factor, Fitted, Shape};
 
-/// Mean held-out loss of a channel's means from which on something is left although no free form describes it: three scales,
+/// Mean loss of a channel's means from which on something is left although no free form describes it: three scales,
 /// where the loss itself begins to bend. None of fifty virtual benches without concealed effects reaches it.
 const LEFT_OVER: f64 = 9.0;
 
-/// The strongest structure in what `model` leaves, if there is more than an ordinary bench leaves.
+/// The strongest structure in what `model` leaves of the recordings of `objective`, if there is more than an ordinary bench leaves.
+/// What is held out chooses nothing; a form is judged by what is held out of them and by the recordings of `judging`.
 ///
 /// # Errors
 /// When the model cannot be driven.
-pub(crate) fn unexplained(objective: &Objective, model: &JointModel) -> Result<Option<Unexplained>, Failure> {
+pub(crate) fn unexplained(
+    objective: &Objective,
+    judging: Option<&Objective>,
+    model: &JointModel,
+) -> Result<Option<Unexplained>, Failure> {
     let (samples, residuals) = {
         let predictions = objective.predict(model)?;
         (Samples::new(objective, &predictions), objective.compare(&predictions))
     };
-    Ok(found(objective, &samples, &residuals))
+    let judging = match judging {
+        Some(judging) => Some(Samples::new(judging, &judging.predict(model)?)),
+        None => None,
+    };
+    Ok(found(objective, &samples, judging.as_ref(), &residuals))
 }
 
-fn found(objective: &Objective, samples: &Samples, residuals: &Residuals) -> Option<Unexplained> {
+fn found(
+    objective: &Objective,
+    samples: &Samples,
+    judging: Option<&Samples>,
+    residuals: &Residuals,
+) -> Option<Unexplained> {
     if let Some(found) = structure::strongest(samples) {
         let left = samples.of(found.series)?;
-        return Some(described(samples, left, &[(found.shape, found.fitted)]));
+        return Some(described(samples, judging, left, &[(found.shape, found.fitted)]));
     }
     let left = samples.of(loudest(objective, residuals)?)?;
-    Some(described(samples, left, &structure::dependence(samples, left)))
+    Some(described(samples, judging, left, &structure::dependence(samples, left)))
 }
 
-/// The series with the largest held-out loss, if it is more than [`LEFT_OVER`].
+/// The series with the largest loss, if it is more than [`LEFT_OVER`].
 fn loudest(objective: &Objective, residuals: &Residuals) -> Option<Series> {
     let mut by_series: BTreeMap<Series, (f64, f64)> = BTreeMap::new();
     for (entry, value) in objective.entries().zip(&residuals.values) {
-        if entry.block.part == Part::HeldOut && entry.aspect == Aspect::Mean {
+        if entry.block.part == Part::Training && entry.aspect == Aspect::Mean {
             let sum = by_series.entry(entry.series).or_insert((0.0, 0.0));
             sum.0 += loss(*value);
             sum.1 += 1.0;
@@ -63,17 +77,25 @@ fn loudest(objective: &Objective, residuals: &Residuals) -> Option<Series> {
 }
 
 /// What is left of `left`, with the forms that describe it, best first.
-fn described(samples: &Samples, left: &Left, forms: &[(Shape, Fitted)]) -> Unexplained {
+fn described(
+    samples: &Samples,
+    judging: Option<&Samples>,
+    left: &Left,
+    forms: &[(Shape, Fitted)],
+) -> Unexplained {
+    let choosing = |values: &[f64]| -> Vec<f64> {
+        (0..samples.len()).filter(|row| samples.may_choose(*row)).map(|row| values[row]).collect()
+    };
     let patterns: Vec<(Series, f64, Vec<f64>)> = samples
         .left
         .iter()
         .map(|other| match forms.first().and_then(|(shape, _)| shape.fit(samples, &other.soft)) {
             Some(fitted) => {
-                let pattern = fitted.form.iter().map(|value| value * other.scale).collect();
-                (other.series, fitted.removed(), pattern)
+                let pattern: Vec<f64> = fitted.form.iter().map(|value| value * other.scale).collect();
+                (other.series, fitted.removed(), choosing(&pattern))
             }
             // Without a form all that is more than usual is the pattern.
-            None => (other.series, mean_square(&other.soft) - 1.0, other.plain.clone()),
+            None => (other.series, mean_square(&choosing(&other.soft)) - 1.0, choosing(&other.plain)),
         })
         .collect();
     let answers: Vec<Answer<'_>> = patterns
@@ -97,7 +119,7 @@ fn described(samples: &Samples, left: &Left, forms: &[(Shape, Fitted)]) -> Unexp
             }
         }
     }
-    let free_form = forms.first().map(|(shape, fitted)| free_form(samples, left, *shape, fitted));
+    let free_form = forms.first().map(|(shape, fitted)| free_form(samples, judging, left, *shape, fitted));
     let (period_rad, frequency_hz) = match forms.first() {
         Some((Shape::Wave { of: Variable::Time, rate, .. }, _)) => (None, Some(rate / TAU)),
         Some((Shape::Wave { rate, .. }, _)) => (Some(TAU / rate), None),
@@ -117,16 +139,33 @@ fn described(samples: &Samples, left: &Left, forms: &[(Shape, Fitted)]) -> Unexp
 }
 
 /// The form in numbers that a report can draw.
-fn free_form(samples: &Samples, left: &Left, shape: Shape, fitted: &Fitted) -> FreeForm {
-    let (mut before, mut after, mut rows) = (0.0, 0.0, 0.0);
-    for (k, plain) in
-        left.plain.iter().enumerate().filter(|(k, plain)| fitted.judged[*k] && plain.is_finite())
+fn free_form(
+    samples: &Samples,
+    judging: Option<&Samples>,
+    left: &Left,
+    shape: Shape,
+    fitted: &Fitted,
+) -> FreeForm {
+    let here = (0..samples.len()).filter(|row| !samples.may_choose(*row));
+    let mut pairs: Vec<[f64; 2]> = here.map(|row| [left.plain[row], fitted.form[row]]).collect();
+    if let Some(judging) = judging
+        && let Some(there) = judging.of(left.series)
     {
-        before += plain.powi(2);
-        after += (plain - left.scale * fitted.form[k]).powi(2);
-        rows += 1.0;
+        let form = shape.at_rows_of(judging, samples, fitted);
+        pairs.extend(there.plain.iter().zip(form).map(|(plain, form)| [*plain, form]));
     }
-    let root = |sum: f64| f64::sqrt(sum / f64::max(rows, 1.0));
+    let told = |pair: &[f64; 2]| pair.iter().all(|value| value.is_finite());
+    pairs.retain(told);
+    let heldout = !pairs.is_empty();
+    if !heldout {
+        let confirming = (0..samples.len()).filter(|row| fitted.confirmed_by[*row]);
+        pairs = confirming.map(|row| [left.plain[row], fitted.form[row]]).filter(told).collect();
+    }
+    let mean = |of: &dyn Fn(&[f64; 2]) -> f64| {
+        pairs.iter().map(|pair| of(pair).powi(2)).sum::<f64>() / f64::max(pairs.len() as f64, 1.0)
+    };
+    let before = mean(&|[plain, _]| *plain);
+    let after = mean(&|[plain, form]| plain - left.scale * form);
     let drawn = |direction: f64| -> Vec<[f64; 2]> {
         let points = shape.drawn(samples, fitted, direction);
         points.into_iter().map(|(x, value)| [x, left.scale * value]).collect()
@@ -141,9 +180,10 @@ fn free_form(samples: &Samples, left: &Left, shape: Shape, fitted: &Fitted) -> F
         unit: super::place::unit_of(left.series).to_owned(),
         points: drawn(1.0),
         points_backwards: if shape.turns() { drawn(-1.0) } else { Vec::new() },
-        heldout_rms_before: root(before),
-        heldout_rms_after: root(after),
-        heldout_share: fitted.share(),
+        heldout,
+        heldout_rms_before: before.sqrt(),
+        heldout_rms_after: after.sqrt(),
+        heldout_share: if before > 0.0 { 1.0 - after / before } else { 0.0 },
     }
 }
 
@@ -183,7 +223,8 @@ fn sentence(left: &Left, forms: &[(Shape, Fitted)], free_form: Option<&FreeForm>
     let reason = if why.is_empty() { String::new() } else { format!("; {why}") };
     format!(
         "{name} shows {pattern}, which no effect of the catalogue explains{reason}. A free form of it, which is no \
-         physics, brings the held-out difference from {} to {} {}.",
+         physics, brings the difference on {} from {} to {} {}.",
+        if form.heldout { "held-out data" } else { "every third second, to which it was not fitted," },
         short(form.heldout_rms_before),
         short(form.heldout_rms_after),
         form.unit

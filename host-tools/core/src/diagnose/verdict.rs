@@ -66,8 +66,10 @@ pub struct NamedEffect {
     /// Fitted parameters of the other instances, strongest first: the harmonics of cogging beside the strongest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further: Vec<BTreeMap<String, Estimate>>,
-    /// Part of the held-out loss that it removes, 0 to 1.
+    /// Part of the held-out loss that it removes, at most 1; negative where held-out data are predicted worse with it.
     pub heldout_improvement: f64,
+    /// Part of the loss that it removes of the data that were fitted, for which it was chosen, 0 to 1.
+    pub training_improvement: f64,
     /// One plain sentence.
     pub sentence: String,
     /// What it could be instead.
@@ -212,8 +214,10 @@ pub struct FoundLaw {
     pub formula: String,
     /// Coefficients.
     pub coefficients: BTreeMap<String, Estimate>,
-    /// Part of the held-out loss that it removes, 0 to 1.
+    /// Part of the held-out loss that it removes, at most 1; negative where held-out data are predicted worse with it.
     pub heldout_improvement: f64,
+    /// Part of the loss that it removes of the data that were fitted, for which it was chosen, 0 to 1.
+    pub training_improvement: f64,
     /// One plain sentence.
     pub sentence: String,
 }
@@ -281,11 +285,15 @@ pub struct FreeForm {
     pub points: Vec<[f64; 2]>,
     /// The same while the input angle falls; empty where the direction does not matter.
     pub points_backwards: Vec<[f64; 2]>,
-    /// Root mean square difference over 10 ms that held-out data have without it, in the channel's unit.
+    /// Whether the next three are of held-out data; where nothing that is held out can judge it, as a form over the time of each
+    /// recording, of every third second of the recordings, to which it was not fitted.
+    #[serde(default)]
+    pub heldout: bool,
+    /// Root mean square difference over 10 ms without it, in the channel's unit.
     pub heldout_rms_before: f64,
     /// The same with it.
     pub heldout_rms_after: f64,
-    /// Share of the held-out squares that it takes off, large differences entering with their root.
+    /// Share of the squares that it takes off.
     pub heldout_share: f64,
 }
 
@@ -322,14 +330,14 @@ pub struct Attempt {
     pub parameters: BTreeMap<String, f64>,
     /// Share of the fitted loss that one simulation promised, 0 to 1.
     pub promised: f64,
-    /// Held-out loss once fitted; `None` where too little was promised.
-    pub heldout_loss: Option<f64>,
+    /// Loss once fitted, over what was fitted; `None` where too little was promised.
+    pub loss: Option<f64>,
 }
 
 /// One round of the search: every effect of the catalogue beside those that were chosen before.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchRound {
-    /// Held-out loss before it.
+    /// Loss before it, over what was fitted.
     pub loss_before: f64,
     /// What was tried, most promising first.
     pub tried: Vec<Attempt>,
@@ -344,9 +352,9 @@ pub struct OrdinaryEffect {
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// Mean loss on held-out data, in squared scales; 1 where every residual is one scale.
+/// Mean loss in squared scales; 1 where every residual is one scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HeldOutLoss {
+pub struct StageLoss {
     /// With the rig as it was.
     pub before: f64,
     /// With nominal parameters recalibrated.
@@ -385,8 +393,10 @@ pub struct Diagnosis {
     pub hypotheses: Vec<TriedHypothesis>,
     /// Scores.
     pub fit: Fit,
-    /// Loss over all channels on held-out data.
-    pub heldout_loss: HeldOutLoss,
+    /// Loss over all channels on held-out data, which took part in no choice.
+    pub heldout_loss: StageLoss,
+    /// The same over the data that were fitted, by which physics was chosen.
+    pub training_loss: StageLoss,
     /// What every bench has a little of, as it was carried along in the search.
     pub ordinary: Vec<OrdinaryEffect>,
     /// By which numbers losses became names and verdict.

@@ -6,7 +6,7 @@ use bowden_model::effect::{ActiveEffect, Component, ParameterSpec};
 
 use super::policy::POLICY;
 use super::selection::{Chosen, Tried};
-use super::verdict::{NamedEffect, Recalibrated, Rival, Verdict};
+use super::verdict::{NamedEffect, Recalibrated, Rival, StageLoss, Verdict};
 use crate::fit::calibrated::wrong_from;
 
 /// What a summary says after Ctrl-C.
@@ -24,7 +24,7 @@ pub(super) fn rivals(
         .others
         .iter()
         .filter(|tried| tried.effect.descriptor().id != own_id)
-        .map(|tried| (tried, POLICY.odds(tried.heldout_loss / chosen.loss_after)))
+        .map(|tried| (tried, POLICY.odds(tried.loss / chosen.loss_after)))
         .collect();
     let sum: f64 = 1.0 + odds.iter().map(|(_, odds)| odds).sum::<f64>();
     let present = POLICY.presence(improvement);
@@ -94,12 +94,17 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
             let _ = write!(text, ", {name} {}{unit}", short(value));
         }
     }
-    let _ = write!(
-        text,
-        "; it removes {:.0} % of the difference on data the fit did not see.",
-        100.0 * improvement
-    );
+    let _ = write!(text, "; it {}.", on_unseen_data(improvement));
     text
+}
+
+/// What something does to the loss of held-out data, of which it removes such a part.
+pub(super) fn on_unseen_data(improvement: f64) -> String {
+    if improvement >= 0.005 {
+        format!("removes {:.0} % of the difference on data the fit did not see", 100.0 * improvement)
+    } else {
+        "removes nothing of the difference on data the fit did not see, so that only the data that were fitted speak for it".to_owned()
+    }
 }
 
 /// Three significant digits, in plain digits where that is readable.
@@ -136,7 +141,7 @@ pub(super) fn summary(
     effects: &[NamedEffect],
     recalibrated: &[Recalibrated],
     by_a_law: bool,
-    [loss_recalibrated, loss_after]: [f64; 2],
+    heldout_loss: &StageLoss,
 ) -> String {
     let changed: Vec<String> = recalibrated
         .iter()
@@ -148,6 +153,16 @@ pub(super) fn summary(
     } else {
         format!("Parameters that were off: {}.", changed.join(", "))
     };
+    let StageLoss { recalibrated: loss_recalibrated, after: loss_after, .. } = *heldout_loss;
+    let brings = format!(
+        "the held-out loss from {loss_recalibrated:.2} to {loss_after:.2} (normalised error; 1 is what sensor noise and an \
+         ordinary bench leave)"
+    );
+    let doubt = if POLICY.pays(loss_recalibrated, loss_after) {
+        ""
+    } else {
+        " Held-out data do not bear it out: it does not hold there, or they hardly show it."
+    };
     match verdict {
         Verdict::Consistent => {
             format!(
@@ -158,14 +173,13 @@ pub(super) fn summary(
         Verdict::MissingPhysics => {
             let names: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
             format!(
-                "The simulation lacks {}: adding it brings the held-out loss from {loss_recalibrated:.2} to \
-                 {loss_after:.2} (normalised error; 1 is what sensor noise and an ordinary bench leave). {parameters}",
+                "The simulation lacks {}: adding it brings {brings}.{doubt} {parameters}",
                 names.join(" and ")
             )
         }
         Verdict::Unexplained if by_a_law => format!(
-            "The recordings hold structure that no effect of the catalogue explains; as a formula it brings the held-out loss from \
-             {loss_recalibrated:.2} to {loss_after:.2} (normalised error; 1 is what sensor noise and an ordinary bench leave). {parameters}"
+            "The recordings hold structure that no effect of the catalogue explains; as a formula it brings {brings}.{doubt} \
+             {parameters}"
         ),
         Verdict::Unexplained => {
             format!("The recordings hold structure that no effect of the catalogue explains. {parameters}")

@@ -18,6 +18,7 @@ mod blockwise;
 mod dataset;
 mod scale;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
@@ -67,10 +68,12 @@ impl Series {
 /// Which part of the data a sum covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// What parameters are fitted to.
+    /// What parameters are fitted to, and physics is chosen on.
     Training,
-    /// What they have not seen.
+    /// What neither has seen.
     HeldOut,
+    /// What is held out of something else.
+    Unused,
 }
 
 /// What one residual compares.
@@ -94,6 +97,9 @@ pub struct Entry {
     /// What is compared.
     pub aspect: Aspect,
 }
+
+/// Sum and number of losses of every stretch of every recording.
+pub type StretchLosses = BTreeMap<(usize, usize), [f64; 2]>;
 
 /// Recordings, prepared for comparison.
 #[derive(Clone, Debug)]
@@ -182,8 +188,7 @@ impl Objective {
     /// first followed by those of the others.
     #[must_use]
     pub fn split(&self) -> [Self; 2] {
-        let fitted = |dataset: &Dataset| dataset.blocks.iter().any(|block| block.part == Part::Training);
-        let count = self.datasets.iter().take_while(|dataset| fitted(dataset)).count();
+        let count = self.datasets.iter().take_while(|dataset| dataset.is_fitted()).count();
         let (fitted, judging) = self.datasets.split_at(count);
         [fitted, judging].map(|datasets| Self { datasets: datasets.to_vec(), ..self.clone() })
     }
@@ -197,6 +202,27 @@ impl Objective {
             }
         }
         self
+    }
+
+    /// The same recordings, of those that are fitted to some held out as a whole; these come last.
+    #[must_use]
+    pub fn holding_out(&self, is_held_out: impl Fn(usize) -> bool) -> Self {
+        let (mut fitted, mut judging) = (Vec::new(), Vec::new());
+        for (recording, dataset) in self.datasets.iter().enumerate() {
+            let judges = is_held_out(recording);
+            let mut dataset = Dataset::clone(dataset);
+            for block in &mut dataset.blocks {
+                block.part = match block.part {
+                    Part::Training if judges => Part::HeldOut,
+                    Part::Training => Part::Training,
+                    // What was held out before judges something else.
+                    Part::HeldOut | Part::Unused => Part::Unused,
+                };
+            }
+            if judges { &mut judging } else { &mut fitted }.push(Arc::new(dataset));
+        }
+        fitted.append(&mut judging);
+        Self { datasets: fitted, ..self.clone() }
     }
 
     /// The same recordings with every sample used for fitting.
@@ -244,7 +270,7 @@ impl Objective {
     pub fn duration_s(&self) -> f64 {
         self.datasets
             .iter()
-            .filter(|d| d.blocks.iter().any(|block| block.part == Part::Training))
+            .filter(|dataset| dataset.is_fitted())
             .map(|d| d.input.t_s().last().unwrap_or(&0.0) - d.input.t_s()[0])
             .sum()
     }
@@ -273,7 +299,7 @@ impl Objective {
                 let means = dataset.blocks.iter().map(move |block| entry(*block, Aspect::Mean));
                 let flutter = dataset.flutter.iter().map(move |group| {
                     let (first, last) = (dataset.blocks[group.start], dataset.blocks[group.end - 1]);
-                    entry(Block { start: first.start, end: last.end, part: first.part }, Aspect::Flutter)
+                    entry(Block { start: first.start, end: last.end, ..first }, Aspect::Flutter)
                 });
                 means.chain(flutter)
             })
@@ -373,7 +399,9 @@ impl Objective {
         match series {
             Series::Channel(channel) if dataset.free_offsets.contains(&channel) => {
                 let (mut sum, mut count) = (0.0, 0.0);
-                for ((block, real), simulated) in dataset.blocks.iter().zip(real).zip(simulated) {
+                let part = if dataset.is_fitted() { Part::Training } else { Part::HeldOut };
+                let all = dataset.blocks.iter().zip(real).zip(simulated);
+                for ((block, real), simulated) in all.filter(|((block, _), _)| block.part == part) {
                     let samples = (block.end - block.start) as f64;
                     sum += samples * (real.mean - simulated.mean);
                     count += samples;
@@ -407,6 +435,21 @@ impl Objective {
             }
         }
         sum / f64::max(count, 1.0)
+    }
+
+    /// Loss of every stretch that is fitted to, by the number of its recording and its own in that: its sum, and over how many
+    /// residuals.
+    #[must_use]
+    pub fn stretch_losses(&self, residuals: &Residuals) -> StretchLosses {
+        let mut of = StretchLosses::new();
+        for (entry, value) in self.entries().zip(&residuals.values) {
+            if entry.block.part == Part::Training {
+                let [sum, count] = of.entry((entry.recording, entry.block.stretch)).or_default();
+                *sum += loss(*value);
+                *count += 1.0;
+            }
+        }
+        of
     }
 
     /// Root mean square difference of a series over a part of the data, sample by sample, in its unit.

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::diagnose::verdict::{
-    ChannelFit, Diagnosis, Estimate, Findings, Fit, FreeForm, HeldOutLoss, MapAxis, MapChannel, Mismatch,
-    NamedEffect, Recalibrated, RegimeResidual, ResidualMap, Rival, SCHEMA, Trace, Unexplained, Verdict,
+    ChannelFit, Diagnosis, Estimate, Findings, Fit, FreeForm, MapAxis, MapChannel, Mismatch, NamedEffect,
+    Recalibrated, RegimeResidual, ResidualMap, Rival, SCHEMA, StageLoss, Trace, Unexplained, Verdict,
 };
 
 /// Channels with unit, amplitude, and error of the rig file as a part of it.
@@ -53,6 +53,7 @@ fn diagnosis() -> Diagnosis {
         ]),
         further: vec![],
         heldout_improvement: 0.714,
+        training_improvement: 0.722,
         sentence:
             "Something bent the sheath between 21.4 s and 27.7 s, which raised friction at the output ends."
                 .into(),
@@ -72,6 +73,7 @@ fn diagnosis() -> Diagnosis {
         parameters: BTreeMap::from([("torque_nm".into(), estimate(0.003_92, Some(0.000_31), "N m"))]),
         further: vec![],
         heldout_improvement: 0.083,
+        training_improvement: 0.170,
         sentence: "The motor loses a constant torque against its direction of motion.".into(),
         rivals: vec![],
     };
@@ -84,6 +86,7 @@ fn diagnosis() -> Diagnosis {
         parameters: BTreeMap::from([("offset".into(), estimate(2.0, None, "N"))]),
         further: vec![],
         heldout_improvement: 0.031,
+        training_improvement: 0.164,
         sentence: "The sensor of f4_n reads too high by a constant.".into(),
         rivals: vec![Rival {
             id: "asymmetric_friction".into(),
@@ -155,6 +158,7 @@ fn diagnosis() -> Diagnosis {
                     .map(|x| [x, 1.4 * (27.0 * x + 0.4).sin()])
                     .collect(),
                 points_backwards: Vec::new(),
+                heldout: true,
                 heldout_rms_before: 1.21,
                 heldout_rms_after: 0.534,
                 heldout_share: 0.805,
@@ -167,7 +171,8 @@ fn diagnosis() -> Diagnosis {
         laws: Vec::new(),
         residual_map: residual_map(),
         policy: crate::diagnose::policy::POLICY,
-        heldout_loss: HeldOutLoss { before: 9.4, recalibrated: 6.2, after: 1.1 },
+        heldout_loss: StageLoss { before: 9.4, recalibrated: 6.2, after: 1.1 },
+        training_loss: StageLoss { before: 9.1, recalibrated: 6.0, after: 1.0 },
         ordinary: Vec::new(),
         search: Vec::new(),
         fit: Fit { heldout: true, channels: fits.collect() },

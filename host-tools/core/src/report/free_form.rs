@@ -50,7 +50,7 @@ pub(super) fn card(left: &Unexplained) -> Markup {
                         div { dt { "Frequency" } dd { (figures::quantity(frequency_hz, "Hz")) } }
                     }
                     @if let Some(form) = &left.free_form {
-                        div { dt { "Held-out difference" } dd {
+                        div { dt { (if form.heldout { "Held-out difference" } else { "Difference on every third second" }) } dd {
                             (figures::quantity(form.heldout_rms_before, &form.unit)) " → "
                             (figures::quantity(form.heldout_rms_after, &form.unit)) " with the free form"
                         } }

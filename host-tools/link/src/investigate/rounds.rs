@@ -68,7 +68,7 @@ pub struct Summary {
     /// Effects, most certain first.
     pub effects: Vec<bowden_core::diagnose::verdict::NamedEffect>,
     /// Loss on held-out data.
-    pub heldout_loss: bowden_core::diagnose::verdict::HeldOutLoss,
+    pub heldout_loss: bowden_core::diagnose::verdict::StageLoss,
 }
 
 impl From<&Diagnosis> for Summary {

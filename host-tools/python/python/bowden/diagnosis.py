@@ -17,11 +17,11 @@ from bowden.errors import InputError
 from bowden.results import (
     ChannelFit,
     Effect,
-    HeldOutLoss,
     Law,
     Mismatch,
     Recalibrated,
     ResidualMap,
+    StageLoss,
     TriedHypothesis,
     Unexplained,
     read,
@@ -111,9 +111,14 @@ class Diagnosis:
         return read(dict[str, ChannelFit], self._data["fit"]["channels"])
 
     @cached_property
-    def heldout_loss(self) -> HeldOutLoss:
-        """Loss over all channels on held-out data."""
-        return read(HeldOutLoss, self._data["heldout_loss"])
+    def heldout_loss(self) -> StageLoss:
+        """Loss over all channels on held-out data, which took part in no choice."""
+        return read(StageLoss, self._data["heldout_loss"])
+
+    @cached_property
+    def training_loss(self) -> StageLoss:
+        """The same over the data that were fitted, by which physics was chosen."""
+        return read(StageLoss, self._data["training_loss"])
 
     @cached_property
     def rigs(self) -> dict[str, Rig]:

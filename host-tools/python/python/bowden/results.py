@@ -15,7 +15,6 @@ __all__ = [
     "Estimate",
     "FittedParameter",
     "FreeForm",
-    "HeldOutLoss",
     "Law",
     "MapAxis",
     "MapChannel",
@@ -24,6 +23,7 @@ __all__ = [
     "ResidualMap",
     "Rival",
     "RivalLoss",
+    "StageLoss",
     "TriedHypothesis",
     "Unexplained",
 ]
@@ -75,7 +75,9 @@ class Effect:
     """Channel, for an effect of a sensor."""
     parameters: dict[str, Estimate]
     heldout_improvement: float
-    """Part of the held-out loss that it removes, 0 to 1."""
+    """Part of the held-out loss that it removes, at most 1; negative where held-out data are predicted worse with it."""
+    training_improvement: float
+    """Part of the loss that it removes of the data that were fitted, for which it was chosen."""
     sentence: str
     rivals: tuple[Rival, ...] = ()
     further: tuple[dict[str, Estimate], ...] = ()
@@ -148,6 +150,8 @@ class FreeForm:
     unit: str
     points: tuple[tuple[float, ...], ...]
     points_backwards: tuple[tuple[float, ...], ...]
+    heldout: bool
+    """Whether the next three are of held-out data; otherwise of every third second, to which it was not fitted."""
     heldout_rms_before: float
     heldout_rms_after: float
     heldout_share: float
@@ -180,6 +184,7 @@ class Law:
     formula: str
     coefficients: dict[str, Estimate]
     heldout_improvement: float
+    training_improvement: float
     sentence: str
 
 
@@ -230,8 +235,8 @@ class ChannelFit:
 
 
 @dataclass(frozen=True)
-class HeldOutLoss:
-    """Mean loss on held-out data, in squared scales; 1 is what sensor noise and an ordinary bench leave."""
+class StageLoss:
+    """Mean loss in squared scales; 1 is what sensor noise and an ordinary bench leave."""
 
     before: float
     recalibrated: float

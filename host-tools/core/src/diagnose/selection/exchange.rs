@@ -41,11 +41,10 @@ impl Search<'_> {
         own.others = rivals.iter().map(|fitted| fitted.tried(fitted.loss)).collect();
         // The others keep their odds.
         let now = present.loss / own.loss_after;
-        own.others.extend(
-            not_fitted.into_iter().map(|tried| Tried { heldout_loss: now * tried.heldout_loss, ..tried }),
-        );
+        own.others.extend(not_fitted.into_iter().map(|tried| Tried { loss: now * tried.loss, ..tried }));
         own.loss_after = present.loss;
         own.model = present.without_ordinary();
+        own.compared[1] = present.solution.model.clone();
         rivals.sort_by(Fitted::best_first);
         let best = rivals.swap_remove(0);
         if best.handicapped() >= handicap(&own.effect) * present.loss {
@@ -57,9 +56,11 @@ impl Search<'_> {
         let tried = best.tried(best.loss);
         let is_other = |other: &Tried| !other.effect.is_beside(&tried.effect);
         let mut others: Vec<Tried> = before.others.into_iter().filter(is_other).collect();
-        others.push(Tried { effect: before.effect, model: before.model, heldout_loss: before.loss_after });
-        let Tried { effect, model, heldout_loss: loss_after } = tried;
-        chosen.push(Chosen { effect, model, loss_before: before.loss_before, loss_after, others });
+        others.push(Tried { effect: before.effect, model: before.model, loss: before.loss_after });
+        let Tried { effect, model, loss: loss_after } = tried;
+        let [without, _] = before.compared;
+        let compared = [without, best.solution.model.clone()];
+        chosen.push(Chosen { effect, model, loss_before: before.loss_before, loss_after, compared, others });
         *present = best;
         Ok(())
     }
@@ -75,7 +76,7 @@ impl Search<'_> {
         let loss_then = chosen[index].loss_after;
         let is_rival = |tried: &Tried| {
             !found.iter().any(|found| found.is_beside(&tried.effect))
-                && POLICY.is_listed(POLICY.odds(tried.heldout_loss / loss_then))
+                && POLICY.is_listed(POLICY.odds(tried.loss / loss_then))
         };
         let (mut rivals, rest): (Vec<Tried>, Vec<Tried>) =
             std::mem::take(&mut chosen[index].others).into_iter().partition(is_rival);

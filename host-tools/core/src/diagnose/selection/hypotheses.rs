@@ -2,12 +2,12 @@
 
 use bowden_model::effect::ActiveEffect;
 
-use super::{Attempted, Fitted, Kind, PROMISING, Round, Search};
+use super::{Fitted, Kind, PROMISING, Search};
 use crate::diagnose::hypotheses::candidate;
 use crate::diagnose::layout::Layout;
-use crate::diagnose::verdict::RivalLoss;
 use crate::fit::free::Free;
 use crate::hypothesis::{self, Hypothesis};
+use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
 
@@ -20,9 +20,11 @@ pub struct Trial {
     pub effect: ActiveEffect,
     /// Standard deviations of its coefficients.
     pub stds: Vec<Option<f64>>,
-    /// Held-out loss without it.
-    pub loss_without: f64,
-    /// Held-out loss with it.
+    /// The model without it.
+    pub without: JointModel,
+    /// The model with it.
+    pub with: JointModel,
+    /// Loss with it.
     pub loss: f64,
     /// What else does best in its place.
     pub rivals: Rivals,
@@ -41,24 +43,37 @@ impl std::fmt::Debug for Trial {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rivals {
     /// Effect of the catalogue.
-    pub catalogue: Option<RivalLoss>,
+    pub catalogue: Option<BestRival>,
     /// Closed form at any port.
-    pub closed_form: Option<RivalLoss>,
+    pub closed_form: Option<BestRival>,
     /// Curve through six values at the same port; of two variables over the better one.
-    pub free_curve: Option<RivalLoss>,
+    pub free_curve: Option<BestRival>,
+}
+
+/// What does best of its kind, by the loss of what is fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BestRival {
+    /// Effect, law, or variable of a curve.
+    pub id: String,
+    /// The model with it.
+    pub model: JointModel,
+    /// Loss with it.
+    loss: f64,
 }
 
 impl Search<'_> {
-    /// Tries every hypothesis by itself. `rounds` are those of the search, of which the first tried the catalogue beside the same.
-    pub(super) fn trials(&self, nothing: &Fitted, rounds: &[Round]) -> Result<Vec<Trial>, Failure> {
+    /// Tries every hypothesis by itself.
+    pub(super) fn trials(&self, nothing: &Fitted) -> Result<Vec<Trial>, Failure> {
         if self.asked.hypotheses.is_empty() || self.progress.interrupted() {
             return Ok(Vec::new());
         }
         let before = self.without_exhausted(nothing)?;
         let predictions = self.objective.predict(&before.solution.model)?;
         let (_, laws) = self.one_more(&before, Kind::Law, PROMISING)?;
-        let closed_form = laws.first().map(|law| rival(law.newest().descriptor().id, law.loss));
-        let catalogue = rounds.first().and_then(|round| best_name(&round.candidates));
+        let closed_form = laws.first().map(|law| rival(law.newest().descriptor().id, law));
+        let (_, names) = self.one_more(&before, Kind::Name, PROMISING)?;
+        let mut names = names.iter().filter(|name| hypothesis::of(&name.newest()).is_none());
+        let catalogue = names.next().map(|name| rival(name.newest().descriptor().id, name));
         let mut trials = Vec::new();
         for hypothesis in self.asked.hypotheses {
             let Some(fitted) = self.alone(&before, &predictions, hypothesis)? else { continue };
@@ -69,8 +84,8 @@ impl Search<'_> {
                 let Some(curve) = hypothesis.free_curve(variable, &effect) else { continue };
                 curve.settle()?;
                 let Some(fitted) = self.alone(&before, &predictions, curve)? else { continue };
-                if rivals.free_curve.as_ref().is_none_or(|best| fitted.loss < best.heldout_loss) {
-                    rivals.free_curve = Some(rival(of.name(), fitted.loss));
+                if rivals.free_curve.as_ref().is_none_or(|best| fitted.loss < best.loss) {
+                    rivals.free_curve = Some(rival(of.name(), &fitted));
                 }
             }
             let model = &fitted.solution.model;
@@ -82,7 +97,8 @@ impl Search<'_> {
                 hypothesis,
                 effect,
                 stds,
-                loss_without: before.loss,
+                without: before.solution.model.clone(),
+                with: model.clone(),
                 loss: fitted.loss,
                 rivals,
             });
@@ -102,14 +118,6 @@ impl Search<'_> {
     }
 }
 
-fn rival(id: &str, heldout_loss: f64) -> RivalLoss {
-    RivalLoss { id: id.to_owned(), heldout_loss }
-}
-
-/// Of the effects of the catalogue that a round fitted, the one that held-out data prefer.
-fn best_name(tried: &[Attempted]) -> Option<RivalLoss> {
-    let names = tried.iter().filter(|attempt| hypothesis::of(&attempt.effect).is_none());
-    let fitted =
-        names.filter_map(|attempt| Some(rival(attempt.effect.descriptor().id, attempt.heldout_loss?)));
-    fitted.min_by(|a, b| a.heldout_loss.total_cmp(&b.heldout_loss))
+fn rival(id: &str, fitted: &Fitted) -> BestRival {
+    BestRival { id: id.to_owned(), model: fitted.solution.model.clone(), loss: fitted.loss }
 }

@@ -43,7 +43,7 @@ impl Search<'_> {
                 self.one_more(&before, Kind::Law, (RIVALLING * removed_share).max(PROMISING))?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
             if let Some((found, with)) = self.found(&before, &beside, fits, Policy::worth_stating)?
-                && better(&POLICY, present.loss, with.loss)
+                && with.shows(present, |without, with| better(&POLICY, without, with))
             {
                 chosen.truncate(kept);
                 chosen.push(found);
@@ -67,7 +67,7 @@ impl Search<'_> {
                 break;
             }
             // Where a free form has shown that something is left, and where, a law of that part need be worth no more than a name.
-            let left = unexplained(self.objective, &present.solution.model)?;
+            let left = unexplained(self.objective, None, &present.solution.model)?;
             let before = self.without_exhausted(present)?;
             let (record, fits) = self.one_more(&before, Kind::Law, PROMISING)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });

@@ -28,7 +28,7 @@ const LEFT_TO_NAMES: usize = 3;
 const PROMISING_INSTANCE: f64 = 0.01;
 
 impl Search<'_> {
-    /// Adds further instances of every chosen effect that has several, where held-out data gain by them.
+    /// Adds further instances of every chosen effect that has several, where the fit gains by them.
     pub(super) fn add_instances(
         &self,
         present: &mut Fitted,
@@ -42,7 +42,11 @@ impl Search<'_> {
             let Some((layout, model, added)) = self.further_instances(present, &effect)? else { continue };
             self.progress.stage("fitting further instances", 0);
             let with = self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?;
-            if self.progress.interrupted() || !POLICY.worth_having(present.loss, with.loss) {
+            let worth = |without: f64, with: f64| POLICY.worth_having(without, with, added);
+            if self.progress.interrupted() || !with.shows(present, worth) {
+                continue;
+            }
+            if !self.holds_across_recordings(present, &with, worth)? {
                 continue;
             }
             let places = with.solution.model.effects.len() - added..;
@@ -51,6 +55,7 @@ impl Search<'_> {
                 model: with.without_ordinary(),
                 loss_before: present.loss,
                 loss_after: with.loss,
+                compared: [present, &with].map(|fitted| fitted.solution.model.clone()),
                 others: Vec::new(),
             }));
             *present = with;

@@ -7,7 +7,6 @@ use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
 use crate::diagnose::onset::between_recordings;
 use crate::diagnose::screening::{Present, Screened, screen};
-use crate::fit::objective::Part;
 use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
@@ -15,7 +14,7 @@ use crate::simulation::Prediction;
 /// Candidates that are fitted, of those that screening ranks first.
 const FITTED: usize = 7;
 
-/// Held-out loss, over that of the best, beyond which a candidate is no finalist.
+/// Loss, over that of the best, beyond which a candidate is no finalist.
 const BEHIND: f64 = 2.5;
 
 /// Part of its estimated gain that a candidate's fit with the slopes of the present model has to reach; one that does not is fitted
@@ -60,10 +59,8 @@ impl Search<'_> {
             screen(objective, &present, all, progress)
         };
         let promising = ranked.iter().filter(|s| s.gain > promising).take(FITTED).count();
-        let mut record: Vec<Attempted> = ranked
-            .iter()
-            .map(|s| Attempted { effect: s.start, promised: s.gain, heldout_loss: None })
-            .collect();
+        let mut record: Vec<Attempted> =
+            ranked.iter().map(|s| Attempted { effect: s.start, promised: s.gain, loss: None }).collect();
         progress.stage("fitting effects", promising as u64);
         let mut fits = self.fit_promising(present, &ranked[..promising])?;
         let best_first = |fits: &mut Vec<(usize, Fitted)>| {
@@ -74,7 +71,7 @@ impl Search<'_> {
         };
         let mut keep = |place: usize, fitted: &Fitted| {
             record[place].effect = fitted.newest();
-            record[place].heldout_loss = Some(fitted.loss);
+            record[place].loss = Some(fitted.loss);
         };
         for (place, fitted) in &fits {
             keep(*place, fitted);
@@ -112,7 +109,7 @@ impl Search<'_> {
 
     /// `present` with each of the candidates, by their places, fitted only as far as a ranking needs.
     fn fit_promising(&self, present: &Fitted, ranked: &[Screened]) -> Result<Vec<(usize, Fitted)>, Failure> {
-        let Self { objective, progress, .. } = *self;
+        let progress = self.progress;
         // One fit by itself leaves threads idle between its rounds of slopes.
         let fits: Result<Vec<Option<(usize, Fitted)>>, Failure> = ranked
             .par_iter()
@@ -127,15 +124,14 @@ impl Search<'_> {
         let mut fits: Vec<(usize, Fitted)> = fits?.into_iter().flatten().collect();
         // The slopes of the present model may have led astray: stick and slip bend the way. Where what was promised would still
         // be the best, slopes of its own show the way.
-        let training = |fitted: &Fitted| objective.mean_loss(&fitted.solution.residuals, Part::Training);
-        let before = training(present);
-        let best = fits.iter().map(|(_, fitted)| training(fitted)).fold(f64::INFINITY, f64::min);
+        let before = present.loss;
+        let best = fits.iter().map(|(_, fitted)| fitted.loss).fold(f64::INFINITY, f64::min);
         fits.par_iter_mut().try_for_each(|(place, fitted)| {
             let screened = &ranked[*place];
-            let astray = training(fitted) > (1.0 - KEPT_PROMISE * screened.gain) * before;
+            let astray = fitted.loss > (1.0 - KEPT_PROMISE * screened.gain) * before;
             if astray && (1.0 - screened.gain) * before < best && !progress.interrupted() {
                 let own = self.fit_new(present, screened, false)?;
-                if training(&own) < training(fitted) {
+                if own.loss < fitted.loss {
                     *fitted = own;
                 }
             }

@@ -9,10 +9,6 @@ use crate::simulation::Prediction;
 /// Pieces of a block of the fit that make one row each: 10 ms, so that up to 45 Hz can be told.
 const PIECES: usize = 5;
 
-/// Length of the stretches of which every third judges where something is fitted to each recording by itself, s. The same as
-/// those that a diagnosis holds out.
-const STRETCH_S: f64 = 1.0;
-
 /// Speed at which a direction counts for three quarters, rad/s: an encoder's count a few samples long is no motion.
 const DIRECTION_RAD_S: f64 = 0.05;
 
@@ -68,6 +64,17 @@ impl Variable {
     }
 }
 
+/// What a row is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowUse {
+    /// Forms are fitted to it.
+    Fitted,
+    /// Confirms what was fitted to the others.
+    Confirming,
+    /// Held out: nothing is chosen by it.
+    HeldOut,
+}
+
 /// Differences of one series.
 #[derive(Clone, Debug)]
 pub(crate) struct Left {
@@ -87,10 +94,8 @@ pub(crate) struct Left {
 pub(crate) struct Samples {
     /// Number of the recording of each row; rows of one recording follow one another.
     pub(crate) recording: Vec<usize>,
-    /// Whether the fit has not seen the row.
-    pub(crate) held_out: Vec<bool>,
-    /// Every third second of every recording, for what is fitted to each recording by itself.
-    pub(crate) third_second: Vec<bool>,
+    /// What each row is used for.
+    pub(crate) used_for: Vec<RowUse>,
     /// Direction of motion, -1 to 1.
     pub(crate) direction: Vec<f64>,
     /// Direction of the last motion of the input pulley, -1 to 1, as dry friction keeps it at rest.
@@ -117,6 +122,16 @@ impl Samples {
     /// Number of rows.
     pub(crate) const fn len(&self) -> usize {
         self.recording.len()
+    }
+
+    /// Whether forms are fitted to a row.
+    pub(crate) fn is_fitted(&self, row: usize) -> bool {
+        self.used_for[row] == RowUse::Fitted
+    }
+
+    /// Whether something may be chosen by a row.
+    pub(crate) fn may_choose(&self, row: usize) -> bool {
+        self.used_for[row] != RowUse::HeldOut
     }
 
     /// Values of a variable; `None` where some recording lacks it.
@@ -151,9 +166,11 @@ impl Samples {
                 let largest = tensions.iter().map(|tension| mean(tension)).fold(f64::NAN, f64::max);
                 let since_s = t_s[samples.start] - t_s[0];
                 self.recording.push(recording);
-                self.held_out.push(block.part == Part::HeldOut);
-                // By the beginning of the block, so that both ways of holding out are one where seconds are held out.
-                self.third_second.push(((t_s[block.start] - t_s[0]) / STRETCH_S) as usize % 3 == 2);
+                self.used_for.push(match block.part {
+                    Part::HeldOut | Part::Unused => RowUse::HeldOut,
+                    Part::Training if block.confirms() => RowUse::Confirming,
+                    Part::Training => RowUse::Fitted,
+                });
                 self.direction.push((speed / DIRECTION_RAD_S).tanh());
                 let values = [
                     or_none(measured(Channel::ThetaOut)),
@@ -177,7 +194,15 @@ impl Samples {
         self.last_direction.extend(last_direction(&self.variables[Variable::ThetaIn as usize][first..]));
         for left in &mut self.left {
             let rows = &mut left.plain[first..];
-            let centre = mean(rows);
+            let used_for = &self.used_for[first..];
+            // What is held out tells no zero, but where nothing else is there.
+            let told = |held_out: bool| -> Vec<f64> {
+                let of =
+                    rows.iter().zip(used_for).filter(|(_, used)| (**used == RowUse::HeldOut) == held_out);
+                of.map(|(value, _)| *value).collect()
+            };
+            let chosen_by = told(false);
+            let centre = if chosen_by.is_empty() { mean(&told(true)) } else { mean(&chosen_by) };
             for value in &mut *rows {
                 *value -= centre;
             }
@@ -188,17 +213,16 @@ impl Samples {
 
 #[cfg(test)]
 impl Samples {
-    /// A table of one recording of rows 10 ms apart, the joint following the input; every third second is held out.
+    /// A table of one recording of rows 10 ms apart, the joint following the input; every third second confirms.
     pub(crate) fn of_one_recording(theta_rad: &[f64], current_a: &[f64], left: Vec<Left>) -> Self {
         let n = theta_rad.len();
         let t_s: Vec<f64> = (0..n).map(|k| 0.01 * k as f64).collect();
         let speed: Vec<f64> =
             (0..n).map(|k| (theta_rad[(k + 1).min(n - 1)] - theta_rad[k.saturating_sub(1)]) / 0.02).collect();
-        let held: Vec<bool> = t_s.iter().map(|t_s| *t_s as usize % 3 == 2).collect();
+        let used_for = |t_s: &f64| if *t_s as usize % 3 == 2 { RowUse::Confirming } else { RowUse::Fitted };
         Self {
             recording: vec![0; n],
-            held_out: held.clone(),
-            third_second: held,
+            used_for: t_s.iter().map(used_for).collect(),
             direction: speed.iter().map(|speed| (speed / DIRECTION_RAD_S).tanh()).collect(),
             last_direction: last_direction(theta_rad),
             left,

@@ -2,10 +2,11 @@
 //! the others. They say how a difference varies, not why.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::samples::{Samples, Variable};
+use super::samples::{RowUse, Samples, Variable};
 
 /// Part of the mean diagonal that is added to each one: a node that no row touches stays at zero.
 const RIDGE: f64 = 1e-3;
@@ -71,8 +72,8 @@ pub(crate) struct Fitted {
     pub(crate) form: Vec<f64>,
     /// Coefficients of the first recording, or of all where one set serves all.
     pub(crate) coefficients: Vec<f64>,
-    /// Rows that it was judged on: none that it does not reach.
-    pub(crate) judged: Vec<bool>,
+    /// Rows that confirm it: none that it does not reach.
+    pub(crate) confirmed_by: Vec<bool>,
 }
 
 impl Fitted {
@@ -116,11 +117,10 @@ impl Shape {
             _ => None,
         };
         let alone = self.is_of_one_recording();
-        let unseen = if alone { &samples.third_second } else { &samples.held_out };
         let without_gain;
         let values = match factor {
             Some(current) if self.grows_with_current() => {
-                without_gain = less_a_gain(samples, unseen, current, values);
+                without_gain = less_a_gain(samples, current, values);
                 &without_gain
             }
             _ => values,
@@ -134,12 +134,12 @@ impl Shape {
             } else {
                 samples.len()
             };
-            let ends = ends_of(&x[start..end]);
+            let ends = self.ends(samples, start..end);
             let mut terms = Vec::new();
             let count = self.count(ends);
             let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
             let usable = |k: usize| values[k].is_finite();
-            for k in (start..end).filter(|k| usable(*k) && !unseen[*k]) {
+            for k in (start..end).filter(|k| usable(*k) && samples.is_fitted(*k)) {
                 self.terms(x[k], factor.map_or(1.0, |f| f[k]), ends, &mut terms);
                 for &(i, a) in &terms {
                     right[i] += a * values[k];
@@ -158,22 +158,56 @@ impl Shape {
             first.get_or_insert_with(|| coefficients.iter().copied().collect::<Vec<f64>>());
             start = end;
         }
-        let judged: Vec<bool> = unseen.iter().zip(x).map(|(unseen, x)| *unseen && self.reaches(*x)).collect();
+        let confirms = |row: usize| samples.used_for[row] == RowUse::Confirming;
+        let confirmed_by: Vec<bool> = (0..samples.len()).map(|k| confirms(k) && self.reaches(x[k])).collect();
         let (mut before, mut after, mut rows) = (0.0, 0.0, 0.0);
-        for k in (0..samples.len()).filter(|k| judged[*k] && values[*k].is_finite()) {
+        for k in (0..samples.len()).filter(|k| confirmed_by[*k] && values[*k].is_finite()) {
             before += values[k].powi(2);
             after += (values[k] - form[k]).powi(2);
             rows += 1.0;
         }
-        let all = unseen.iter().zip(values).filter(|(unseen, value)| **unseen && value.is_finite()).count();
+        let all = (0..samples.len()).filter(|k| confirms(*k) && values[*k].is_finite()).count();
         (rows > 0.0).then(|| Fitted {
             before: before / rows,
             after: after / rows,
             reached: rows / all as f64,
             form,
             coefficients: first.unwrap_or_default(),
-            judged,
+            confirmed_by,
         })
+    }
+
+    /// Ends of the variable over the rows by which something may be chosen; over all where those are the only ones.
+    fn ends(self, samples: &Samples, rows: Range<usize>) -> (f64, f64) {
+        let x = samples.variable(self.variable()).unwrap_or_default();
+        let choosing: Vec<f64> = rows.clone().filter(|k| samples.may_choose(*k)).map(|k| x[k]).collect();
+        if choosing.is_empty() { ends_of(&x[rows]) } else { ends_of(&choosing) }
+    }
+
+    /// Value of the form, as it was fitted to `samples`, at every row of a table, in scales; not a number where it says nothing.
+    ///
+    /// A form of one recording alone says nothing of another.
+    pub(crate) fn at_rows_of(self, table: &Samples, samples: &Samples, fitted: &Fitted) -> Vec<f64> {
+        let nothing = vec![f64::NAN; table.len()];
+        let (Some(x), false) = (table.variable(self.variable()), self.is_of_one_recording()) else {
+            return nothing;
+        };
+        let factor = match self {
+            _ if self.grows_with_current() => table.variable(Variable::Current),
+            Self::Curve { times: Factor::Direction, .. } => Some(table.direction.as_slice()),
+            Self::Spot { .. } => Some(table.last_direction.as_slice()),
+            _ => None,
+        };
+        let ends = self.ends(samples, 0..samples.len());
+        let mut terms = Vec::new();
+        let at = |(k, x): (usize, &f64)| {
+            if !self.reaches(*x) {
+                return f64::NAN;
+            }
+            self.terms(*x, factor.map_or(1.0, |f| f[k]), ends, &mut terms);
+            terms.iter().map(|&(i, a)| a * fitted.coefficients[i]).sum()
+        };
+        x.iter().enumerate().map(at).collect()
     }
 
     /// Whether the form says anything at `x`.
@@ -194,13 +228,15 @@ impl Shape {
     pub(crate) fn drawn(self, samples: &Samples, fitted: &Fitted, direction: f64) -> Vec<(f64, f64)> {
         /// Points of a wave's period, and of a spot.
         const POINTS: usize = 32;
-        let Some(x) = samples.variable(self.variable()) else { return Vec::new() };
+        if samples.variable(self.variable()).is_none() {
+            return Vec::new();
+        }
         let rows = if self.is_of_one_recording() {
             samples.recording.partition_point(|r| *r == samples.recording[0])
         } else {
             samples.len()
         };
-        let ends = ends_of(&x[..rows]);
+        let ends = self.ends(samples, 0..rows);
         let (from, to, points) = match self {
             Self::Curve { .. } => (ends.0, ends.1, self.nodes(ends) - 1),
             Self::Wave { rate, .. } => (0.0, TAU / rate, POINTS),
@@ -273,11 +309,11 @@ impl Shape {
     }
 }
 
-/// `values` of every recording without their part in proportion to `current`, as the rows that are not `unseen` have it.
-fn less_a_gain(samples: &Samples, unseen: &[bool], current: &[f64], values: &[f64]) -> Vec<f64> {
+/// `values` of every recording without their part in proportion to `current`, as the rows have it that forms are fitted to.
+fn less_a_gain(samples: &Samples, current: &[f64], values: &[f64]) -> Vec<f64> {
     let recordings = samples.recording.last().map_or(0, |last| last + 1);
     let mut sums = vec![(0.0, f64::MIN_POSITIVE); recordings];
-    for k in (0..samples.len()).filter(|k| !unseen[*k] && values[*k].is_finite()) {
+    for k in (0..samples.len()).filter(|k| samples.is_fitted(*k) && values[*k].is_finite()) {
         let (along, power) = &mut sums[samples.recording[k]];
         *along += current[k] * values[k];
         *power += current[k] * current[k];

@@ -207,7 +207,7 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     let longest = longest(samples)?;
     let usable = |k: &usize| {
         samples.recording[*k] == longest
-            && !samples.third_second[*k]
+            && samples.is_fitted(*k)
             && t_s[*k] < FREQUENCY_WINDOW_S
             && left.soft[*k].is_finite()
     };
@@ -215,7 +215,9 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     let mut table = centred(t_s, weights, left, &rows);
     let (first_s, last_s) = ends_of(&table.x);
     // Rows farther apart than half a period tell nothing of it.
-    let spacing_s = (last_s - first_s) / (1.5 * rows.len() as f64);
+    let all =
+        samples.recording.iter().zip(t_s).filter(|(r, t)| **r == longest && **t < FREQUENCY_WINDOW_S).count();
+    let spacing_s = (last_s - first_s) / all as f64;
     let (lowest_hz, highest_hz) = match times {
         Factor::Current => (FEWEST_SWINGS / (last_s - first_s), FASTEST_SWING_HZ),
         _ => FREQUENCIES_HZ,
@@ -251,7 +253,7 @@ fn motion_period_s(samples: &Samples, recording: usize) -> Option<f64> {
 /// Wave over a position that takes most off the rows that may be fitted.
 fn period(samples: &Samples, left: &Left, of: Variable) -> Option<Shape> {
     let theta_rad = samples.variable(of)?;
-    let usable = |k: &usize| !samples.held_out[*k] && left.soft[*k].is_finite();
+    let usable = |k: &usize| samples.is_fitted(*k) && left.soft[*k].is_finite();
     let all: Vec<usize> = (0..samples.len()).filter(usable).collect();
     let rows: Vec<usize> = all.iter().copied().step_by(all.len().div_ceil(POSITION_ROWS).max(1)).collect();
     let table = centred(theta_rad, None, left, &rows);
@@ -270,7 +272,7 @@ fn spot(samples: &Samples, left: &Left) -> Option<Shape> {
     let of = Variable::ThetaIn;
     let theta_rad = samples.variable(of)?;
     let rows: Vec<usize> =
-        (0..samples.len()).filter(|k| !samples.held_out[*k] && left.soft[*k].is_finite()).collect();
+        (0..samples.len()).filter(|k| samples.is_fitted(*k) && left.soft[*k].is_finite()).collect();
     let of_rows = |values: &[f64]| -> Vec<f64> { rows.iter().map(|k| values[*k]).collect() };
     let (x, directions, values) = (of_rows(theta_rad), of_rows(&samples.last_direction), of_rows(&left.soft));
     let (low, high) = ends_of(&x);

@@ -53,7 +53,7 @@ fn samples(left: Vec<Left>) -> Samples {
 
 fn told(samples: &Samples) -> Unexplained {
     let found = strongest(samples).expect("structure");
-    described(samples, samples.of(found.series).unwrap(), &[(found.shape, found.fitted)])
+    described(samples, None, samples.of(found.series).unwrap(), &[(found.shape, found.fitted)])
 }
 
 /// The joint of radius r between two cables of stiffness k, held at the input: a torque d on the arm turns it by

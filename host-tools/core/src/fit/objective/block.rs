@@ -2,6 +2,9 @@
 
 use super::Part;
 
+/// Of so many stretches one confirms regressions on the others.
+const CONFIRMING: usize = 3;
+
 /// Samples that are compared as one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
@@ -11,6 +14,16 @@ pub struct Block {
     pub end: usize,
     /// Use of the block.
     pub part: Part,
+    /// Number of its stretch of a second among those of the recording that are fitted to, or among those that are held out.
+    pub stretch: usize,
+}
+
+impl Block {
+    /// Whether a regression on the other blocks that are fitted to is confirmed on this one.
+    #[must_use]
+    pub const fn confirms(&self) -> bool {
+        self.stretch % CONFIRMING == CONFIRMING - 1
+    }
 }
 
 /// Of the samples of one block.

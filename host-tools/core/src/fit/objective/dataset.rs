@@ -23,7 +23,7 @@ const FLUTTER_S: f64 = 0.5;
 /// Time at the start of each recording, and after a gap in it, that is not compared, s: how it came there is not known.
 const LEAD_IN_S: f64 = 0.3;
 
-/// Length of the stretches that are held out in turn, s.
+/// Length of the stretches that are held out, or confirm, in turn, s.
 const STRETCH_S: f64 = 1.0;
 
 /// Samples on zero from which on an amplifier of tension is taken to have stood at its end.
@@ -56,6 +56,11 @@ impl Dataset {
             Some(variation) => Cow::Owned(variation.apply(model)),
             None => Cow::Borrowed(model),
         }
+    }
+
+    /// Whether anything is fitted to it.
+    pub(super) fn is_fitted(&self) -> bool {
+        self.blocks.iter().any(|block| block.part == Part::Training)
     }
 
     /// Whether something was different in this recording.
@@ -133,7 +138,13 @@ impl Dataset {
             let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
             let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;
             let held = split && stretch % 3 == 2;
-            blocks.push(Block { start, end, part: if held { Part::HeldOut } else { part } });
+            let stretch = match (split, held) {
+                (false, _) => stretch,
+                (true, false) => 2 * (stretch / 3) + stretch % 3,
+                (true, true) => stretch / 3,
+            };
+            let part = if held { Part::HeldOut } else { part };
+            blocks.push(Block { start, end, part, stretch });
             start = end;
         }
         let mut flutter: Vec<Range<usize>> = Vec::new();

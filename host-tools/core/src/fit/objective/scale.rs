@@ -31,10 +31,16 @@ pub fn soft(residual: f64) -> f64 {
     LOSS_BEND * (2.0 * ((1.0 + z * z).sqrt() - 1.0)).sqrt().copysign(residual)
 }
 
-fn recorded(datasets: &[Dataset], series: Series) -> impl Iterator<Item = &[f64]> {
-    datasets
-        .iter()
-        .flat_map(move |d| d.measured.iter().filter(move |(s, _)| *s == series).map(|(_, v)| v.as_slice()))
+/// Measured values of a series in the recordings that are fitted to; in those that only judge where no other holds it.
+fn recorded(datasets: &[Dataset], series: Series) -> Vec<&[f64]> {
+    let of = |fitted: bool| {
+        let datasets = datasets.iter().filter(move |dataset| dataset.is_fitted() == fitted);
+        datasets.flat_map(move |d| {
+            d.measured.iter().filter(move |(s, _)| *s == series).map(|(_, v)| v.as_slice())
+        })
+    };
+    let fitted: Vec<&[f64]> = of(true).collect();
+    if fitted.is_empty() { of(false).collect() } else { fitted }
 }
 
 /// White noise of the sensor, and a twelfth of its step squared.
@@ -46,7 +52,7 @@ pub(super) fn noise_variance(model: &JointModel, series: Series, datasets: &[Dat
         Channel::MotorCurrent => sensors.current_noise_a,
         _ => 0.0,
     };
-    let quantum = recorded(datasets, series).filter_map(quantum_of).fold(0.0, f64::max);
+    let quantum = recorded(datasets, series).into_iter().filter_map(quantum_of).fold(0.0, f64::max);
     noise * noise + quantum * quantum / 12.0
 }
 
@@ -63,7 +69,8 @@ pub(super) fn scale_of(model: &JointModel, series: Series, noise_variance: f64, 
                 Channel::ThetaIn | Channel::ThetaOut | Channel::ThetaMotor => ANGLE_FLOOR,
                 _ => MODEL_FLOOR,
             };
-            let spread = recorded(datasets, series).map(|v| moments(v).variance).fold(0.0, f64::max);
+            let spread =
+                recorded(datasets, series).into_iter().map(|v| moments(v).variance).fold(0.0, f64::max);
             (noise_variance + floor * floor * spread).sqrt().max(f64::MIN_POSITIVE)
         }
     }

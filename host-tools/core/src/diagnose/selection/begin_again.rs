@@ -1,0 +1,77 @@
+//! A search that begins with another name: where much is left although names were found, the first of them may have been the wrong one to
+//! begin with. Friction with the square of a load is worth little before the dry friction beside it is known, and the other way round.
+
+use super::{Chosen, Fitted, Round, Search, Tried, handicap};
+use crate::diagnose::policy::POLICY;
+use crate::fit::solver::{COARSE_STEP, FINE_STEP};
+use crate::outcome::Failure;
+
+/// Most rivals of the first name with which a search begins again.
+const RIVALS: usize = 4;
+
+impl Search<'_> {
+    /// Where the names leave more than [`Policy::much_left`](crate::diagnose::policy::Policy::much_left), searches again with each of the best
+    /// rivals of the first in its place, and keeps what is worth a name more than what is there. `nothing` is the fit without any.
+    pub(super) fn begin_again(
+        &self,
+        nothing: &Fitted,
+        present: &mut Fitted,
+        chosen: &mut Vec<Chosen>,
+        rounds: &mut Vec<Round>,
+    ) -> Result<(), Failure> {
+        let Some(first) = chosen.first().filter(|_| present.loss > POLICY.much_left).cloned() else {
+            return Ok(());
+        };
+        let own = Tried { effect: first.effect, model: first.model.clone(), loss: first.loss_after };
+        let mut best: Option<(Fitted, Vec<Chosen>)> = None;
+        for (place, rival) in first.others.iter().take(RIVALS).enumerate() {
+            if self.progress.interrupted() {
+                return Ok(());
+            }
+            let (layout, with) = nothing.layout.with(&nothing.solution.model, rival.effect);
+            let mut other = self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
+            let rest = first.others.iter().enumerate().filter(|(other, _)| *other != place);
+            let mut others: Vec<Tried> = rest.map(|(_, tried)| tried.clone()).collect();
+            others.push(own.clone());
+            others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+            let mut others_chosen = vec![Chosen {
+                effect: other.newest(),
+                model: other.without_ordinary(),
+                loss_before: nothing.loss,
+                loss_after: other.loss,
+                compared: [nothing, &other].map(|fitted| fitted.solution.model.clone()),
+                others,
+            }];
+            self.add_names(&mut other, &mut others_chosen, rounds)?;
+            if best.as_ref().is_none_or(|(best, _)| other.loss < best.loss) {
+                best = Some((other, others_chosen));
+            }
+        }
+        if let Some((other, others_chosen)) = best
+            && self.is_better((present, chosen), (&other, &others_chosen))?
+        {
+            (*present, *chosen) = (other, others_chosen);
+        }
+        Ok(())
+    }
+
+    /// Whether other names are to take the place of those that are there. Each of either is worth its place beside the others of its own.
+    /// Where recordings can judge one another those that predict better do; where they cannot, the others have to be worth a name more.
+    fn is_better(
+        &self,
+        (present, chosen): (&Fitted, &[Chosen]),
+        (other, others_chosen): (&Fitted, &[Chosen]),
+    ) -> Result<bool, Failure> {
+        if !self.recordings_judge_one_another() {
+            return Ok(other.shows(present, |without, with| POLICY.worth_naming(without, with)));
+        }
+        let [here, there] = [chosen, others_chosen].map(handicap_of_all);
+        let better = |loss: f64, others_loss: f64| there * others_loss < here * loss;
+        Ok(better(present.loss, other.loss) && self.holds_across_recordings(present, other, better)?)
+    }
+}
+
+/// Factor of the loss with several effects, where they are compared with others.
+fn handicap_of_all(chosen: &[Chosen]) -> f64 {
+    chosen.iter().map(|one| handicap(&one.effect)).product()
+}
