@@ -29,12 +29,13 @@ fn a_double_pendulum_in_urdf_is_one_weight() {
     let rig = found.document(bench()).unwrap().rig().unwrap();
     let load = rig.joint.load.unwrap();
     let (m1, m2): (f64, f64) = (0.26703, 0.33238);
-    let (y, z) = (m1 * 2.1727e-6 + m2 * 1.9371e-10, m1 * 0.036012 + m2 * (0.1 + 0.10088));
+    let (y, z) = (m1 * 2.1727e-6 + m2 * 1.9371e-10, m1 * 0.036_012 + m2 * (0.1 + 0.10088));
     let arm_m = y.hypot(z) / (m1 + m2);
     near(load.mass_kg, m1 + m2);
     near(load.arm_m, arm_m);
     let about_x = |ixx: f64, m: f64, y: f64, z: f64| ixx + m * (y * y + z * z);
-    let inertia = about_x(0.00040827, m1, 2.1727e-6, 0.036012) + about_x(0.0011753, m2, 1.9371e-10, 0.20088);
+    let inertia =
+        about_x(0.000_408_27, m1, 2.1727e-6, 0.036_012) + about_x(0.001_175_3, m2, 1.9371e-10, 0.20088);
     near(load.inertia_kg_m2 + load.mass_kg * arm_m * arm_m, inertia);
     near(load.viscous_nm_s_per_rad, 0.05);
     assert!((found.zero_rad.abs() - PI).abs() < 1e-4, "{}", found.zero_rad);
