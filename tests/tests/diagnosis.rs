@@ -77,9 +77,9 @@ impl Outcome {
             println!("  {} {:?} {:?} {:?}", effect.id, effect.onset_s, effect.channel, effect.parameters);
         }
         for round in &d.search {
-            println!("  held-out loss {:.3} before; tried:", round.loss_before);
+            println!("  loss {:.3} before; tried:", round.loss_before);
             for tried in round.tried.iter().take(3) {
-                println!("    {} promised {:.2} loss {:.3?}", tried.id, tried.promised, tried.heldout_loss);
+                println!("    {} promised {:.2} loss {:.3?}", tried.id, tried.promised, tried.loss);
             }
         }
         println!("  {:?}\n  {:?}", d.recalibrated, d.unexplained);
