@@ -238,6 +238,26 @@ impl Samples {
     }
 }
 
+#[cfg(test)]
+impl Samples {
+    /// The same table, another recording behind it.
+    pub(crate) fn followed_by(mut self, mut other: Self) -> Self {
+        let number = self.recording.last().map_or(0, |last| last + 1);
+        self.recording.extend(other.recording.iter().map(|recording| number + recording));
+        self.used_for.append(&mut other.used_for);
+        self.direction.append(&mut other.direction);
+        self.last_direction.append(&mut other.last_direction);
+        for (left, mut other) in self.left.iter_mut().zip(other.left) {
+            left.soft.append(&mut other.soft);
+            left.plain.append(&mut other.plain);
+        }
+        for (values, mut other) in self.variables.iter_mut().zip(other.variables) {
+            values.append(&mut other);
+        }
+        self
+    }
+}
+
 /// Direction that dry friction has at every row of one recording: it follows the angle over [`TURNING_RAD`] and no farther
 /// (Prandtl's element). Zero before the first motion, and where the angle is not known.
 fn last_direction(theta_rad: &[f64]) -> Vec<f64> {

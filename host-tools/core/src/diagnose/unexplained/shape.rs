@@ -1,6 +1,7 @@
 //! Free forms: curves and waves over a variable, fitted by linear least squares to rows that a fit may see, and judged on
 //! the others. They say how a difference varies, not why.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -80,6 +81,18 @@ impl Fitted {
     /// Squared scales that it takes off rows that it has not seen, in the mean of all of them.
     pub(crate) fn removed(&self) -> f64 {
         self.reached * (self.before - self.after)
+    }
+
+    /// Whether it takes such a share off the rows that confirm it in most of the recordings: what is fitted to each recording by itself, and
+    /// shows in one of several, is how that motion rings.
+    pub(crate) fn shows_in_most(&self, samples: &Samples, values: &[f64], share: f64) -> bool {
+        let mut squares: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
+        for k in (0..samples.len()).filter(|k| self.confirmed_by[*k] && values[*k].is_finite()) {
+            let of = squares.entry(samples.recording[k]).or_default();
+            *of = [of[0] + values[k].powi(2), of[1] + (values[k] - self.form[k]).powi(2)];
+        }
+        let shown = squares.values().filter(|[before, after]| before - after >= share * before).count();
+        2 * shown > squares.len()
     }
 
     /// What it takes off, as a share of what was there where it reaches.

@@ -97,7 +97,9 @@ pub(crate) fn strongest(samples: &Samples) -> Option<Structure> {
     let repeats = longest(samples).is_some_and(|recording| motion_period_s(samples, recording).is_some());
     let clear = |left: &Left, (shape, fitted): &(Shape, Fitted)| {
         let bar = bar(*shape, left.series, repeats);
-        fitted.share() >= bar.share && fitted.removed() >= bar.removed
+        fitted.share() >= bar.share
+            && fitted.removed() >= bar.removed
+            && (!shape.is_of_one_recording() || fitted.shows_in_most(samples, &left.soft, bar.share))
     };
     let all: Vec<Vec<(Shape, Fitted)>> = samples
         .left

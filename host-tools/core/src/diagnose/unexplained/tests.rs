@@ -266,3 +266,19 @@ fn noise_and_what_held_out_data_do_not_confirm_are_no_structure() {
         .map(|(k, theta)| if (k / 100) % 3 == 2 { 0.0 } else { 3.0 * (20.0 * theta).sin() });
     assert!(strongest(&samples(vec![left(Channel::F1, sum(&noise(20), seen))])).is_none());
 }
+
+/// Two recordings that swing at 20 Hz in one of them: fitted to each by itself, it is how that motion rings.
+#[test]
+fn what_swings_in_one_recording_of_several_is_no_structure() {
+    let swing = |k: usize| 2.0 * (TAU * 20.0 * 0.01 * k as f64).sin();
+    let of = |second: f64| {
+        let values = |seed: u64, size: f64| -> Vec<f64> {
+            noise(seed).iter().enumerate().map(|(k, noise)| noise + size * swing(k)).collect()
+        };
+        let first = samples(vec![left(Channel::F2, values(31, 1.0))]);
+        let second = samples(vec![left(Channel::F2, values(32, second))]);
+        strongest(&first.followed_by(second)).map(|found| found.shape)
+    };
+    assert_eq!(of(0.0), None);
+    assert!(matches!(of(1.0), Some(Shape::Wave { of: Variable::Time, .. })), "in both");
+}
