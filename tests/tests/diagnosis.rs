@@ -325,8 +325,10 @@ fn an_output_pulley_that_is_not_round_is_put_into_a_formula() {
     outcome.predicts_within(0.5);
 }
 
+/// The held-out recording tells that the friction changed, and not what is written: that is 1.5 times the rig's 0.12, as in the recording that is
+/// fitted.
 #[test]
-fn parameters_that_change_between_recordings_are_told_and_those_of_the_rig_kept() {
+fn parameters_that_change_between_recordings_are_told_and_chosen_by_those_that_are_fitted() {
     let changed = Case::new("case", Vec::new(), 109, 1.0).off(Parameter::FrictionCoefficient, 1.5);
     let as_stated = Case::new("case", Vec::new(), 109, 1.0);
     let training = recording_of(&changed.train(MotionKind::Lab, SECONDS).unwrap());
@@ -342,7 +344,8 @@ fn parameters_that_change_between_recordings_are_told_and_those_of_the_rig_kept(
         (unexplained.component.as_str(), &unexplained.depends_on[..]),
         ("transmission", &["recording".to_owned()][..])
     );
-    assert!(found.recalibrated.iter().all(|p| p.fitted == p.nominal), "{:?}", found.recalibrated);
+    let friction = found.recalibrated.iter().find(|p| p.parameter == "sheath.friction_coefficient").unwrap();
+    assert!((friction.fitted / 0.18 - 1.0).abs() < 0.02, "{friction:?}");
 }
 
 #[test]
