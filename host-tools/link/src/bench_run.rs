@@ -181,6 +181,10 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
         plan: Some((text.to_owned(), item.name.clone())),
         ..origin.clone()
     };
+    // A power cut leaves rows that no entry of the ledger tells of.
+    if out.exists() {
+        put_aside(&out)?;
+    }
     let capture = Capture {
         out: &out,
         format: Format::for_rows(&out)?,
