@@ -26,6 +26,9 @@ use plan_file::{Motion, Plan, Step};
 /// Longest wait for something from the board during a pause.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// Endings of the recordings that a run may leave.
+pub const ENDINGS: [&str; 3] = ["csv", "csv.gz", "mcap"];
+
 /// One thing to do, with the name of what it leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
@@ -52,7 +55,7 @@ pub enum Action {
 pub struct Setting<'s> {
     /// Folder of recordings, ledger and summary.
     pub folder: &'s Path,
-    /// Ending of recordings: `csv`, `csv.gz`, `mcap`.
+    /// Ending of recordings, one of [`ENDINGS`].
     pub ending: &'s str,
     /// What recordings say of themselves; plan and step are added.
     pub origin: &'s Origin,
@@ -172,6 +175,13 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
     let Setting { folder, ending, origin, text, stop, progress } = *setting;
     let name = format!("{}.{ending}", item.name);
     let out = folder.join(&name);
+    // `kill -9` and a power cut leave rows that no entry of the ledger tells of, perhaps in another format. Before anything moves.
+    for ending in ENDINGS {
+        let left = folder.join(format!("{}.{ending}", item.name));
+        if left.exists() {
+            put_aside(&left)?;
+        }
+    }
     progress.stage(&format!("{}: pretension check and homing", item.name), 0);
     session.ready(stop)?;
     session.home(stop)?;
@@ -181,10 +191,6 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
         plan: Some((text.to_owned(), item.name.clone())),
         ..origin.clone()
     };
-    // A power cut leaves rows that no entry of the ledger tells of.
-    if out.exists() {
-        put_aside(&out)?;
-    }
     let capture = Capture {
         out: &out,
         format: Format::for_rows(&out)?,
@@ -220,17 +226,24 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
     }
 }
 
-/// Renames what was recorded of a step that was stopped, with what stands beside it; the step is done again.
+/// Renames what was recorded of a step that was stopped, with what stands beside it; the step is done again. Nothing is overwritten.
 fn put_aside(out: &Path) -> Result<PathBuf, Failure> {
     let beside = bowden_core::recording::Metadata::file_beside(out);
+    // The recording last: while it has its name, what is beside it is still to be kept.
     let files: Vec<PathBuf> =
-        [Some(out.to_owned()), beside, Some(sidecar(out))].into_iter().flatten().collect();
+        [beside, Some(sidecar(out)), Some(out.to_owned())].into_iter().flatten().collect();
     let aside = |path: &Path, number: u32| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
         path.with_file_name(format!("{stem}.stopped-{number}.{ending}"))
     };
-    let number = (1..=u32::MAX).find(|number| !aside(out, *number).exists()).unwrap_or(1);
+    // A number for each start, whatever formats they wrote: recordings of two formats share the names of what is beside them.
+    let stem = out.with_extension("").with_extension("");
+    let taken = |number: u32| {
+        let others = ENDINGS.iter().map(|ending| stem.with_extension(ending));
+        files.iter().cloned().chain(others).any(|path| aside(&path, number).exists())
+    };
+    let number = (1..=u32::MAX).find(|number| !taken(*number)).unwrap_or(u32::MAX);
     for path in files.iter().filter(|path| path.exists()) {
         std::fs::rename(path, aside(path, number)).map_err(|error| {
             let reason = bowden_core::output::describe(&error);

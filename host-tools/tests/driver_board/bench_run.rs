@@ -2,14 +2,17 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Stdio;
+use std::time::Instant;
 
 use bowden_core::recording::{ReadOptions, Recording};
 use serde_json::Value;
 
-use crate::bowden;
+use crate::cuts::PATIENCE;
 use crate::fake::Fake;
 use crate::mishaps::Mishaps;
 use crate::pseudo_terminal::Terminal;
+use crate::{bowden, command};
 
 const PLAN: &str = r#"schema = "bowden-plan/1"
 name = "check"
@@ -130,6 +133,83 @@ fn a_run_that_a_fault_stopped_goes_on_where_it_was() {
     assert!(stdout.starts_with("unnamed: 2 steps done, 1 of them before this start\n"), "{stdout}");
     assert_eq!(ledger(folder.path())[1], ("02-hold".to_owned(), 2000));
     assert!(folder.path().join("out/02-hold.stopped-1.csv").exists());
+}
+
+/// Names and contents of a folder's files whose name begins so.
+fn files(folder: &Path, beginning: &str) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .filter(|entry| entry.file_name().to_str().unwrap().starts_with(beginning))
+        .map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()))
+        .collect();
+    files.sort();
+    files
+}
+
+fn names(files: &[(String, Vec<u8>)]) -> Vec<&str> {
+    files.iter().map(|(name, _)| name.as_str()).collect()
+}
+
+#[test]
+fn rows_of_a_killed_run_are_kept_whatever_format_the_next_start_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    let plan = "schema = \"bowden-plan/1\"\n[[step]]\nkind = \"follow\"\nreference = \"hold\"\nseconds = 6\n";
+    fs::write(place.join("plan.toml"), plan).unwrap();
+    // What each start leaves, by the names under which it is to be kept.
+    let mut kept: Vec<(String, Vec<u8>)> = Vec::new();
+    for (turn, (format, bytes)) in
+        [("csv", 500_000), ("csv.gz", 50_000), ("mcap", 100_000), ("csv", 500_000)].into_iter().enumerate()
+    {
+        let arguments = ["run", "plan.toml", "--port", "sim", "--out", "out", "--format", format];
+        let path = place.join(format!("out/01-hold.{format}"));
+        let mut child =
+            command(place, &arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let begun = Instant::now();
+        while fs::metadata(&path).map_or(0, |file| file.len()) < bytes {
+            assert!(child.try_wait().unwrap().is_none() && begun.elapsed() < PATIENCE, "{format}");
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        // SIGKILL: nothing of the program runs any more.
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let (earlier, mut left): (Vec<_>, Vec<_>) = files(&place.join("out"), "01-hold")
+            .into_iter()
+            .partition(|(name, _)| name.contains(".stopped-"));
+        kept.sort();
+        assert_eq!(names(&earlier), names(&kept), "start {turn}");
+        assert!(earlier == kept, "start {turn}: bytes of what was kept have changed");
+        for (name, _) in &mut left {
+            *name = name.replacen("01-hold", &format!("01-hold.stopped-{}", turn + 1), 1);
+        }
+        kept.extend(left);
+    }
+    let (status, stdout, stderr) = run(place, plan, &["--format", "csv.gz"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    assert!(stdout.contains("60000 rows in 01-hold.csv.gz"), "{stdout}");
+    kept.sort();
+    let found = files(&place.join("out"), "01-hold.stopped-");
+    let names = names(&kept);
+    assert_eq!(found.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), names);
+    assert!(found == kept, "bytes of what was kept have changed");
+    for (number, beside) in [(1, true), (2, true), (3, false), (4, true)] {
+        let beside = beside.then(|| format!("01-hold.stopped-{number}.parameters.toml"));
+        assert!(beside.is_none_or(|beside| names.contains(&beside.as_str())), "{names:?}");
+    }
+    assert!(names.contains(&"01-hold.stopped-3.mcap"), "{names:?}");
+    // The killed CSV is the beginning of the run that went to its end: the simulated joint does the same every time.
+    let load = |name: &str| Recording::load(&place.join("out").join(name), &ReadOptions::default()).unwrap();
+    let whole = load("01-hold.csv.gz");
+    assert_eq!(whole.len(), 60_000);
+    for name in ["01-hold.stopped-1.csv", "01-hold.stopped-4.csv"] {
+        let text = fs::read_to_string(place.join("out").join(name)).unwrap();
+        let rows = text.lines().count() - 1;
+        assert!(rows > 1000, "{name}: {rows} rows");
+        fs::write(place.join("out/cut.csv"), &text[..=text.rfind('\n').unwrap()]).unwrap();
+        let cut = load("cut.csv");
+        assert_eq!(cut, whole.slice(0..cut.len()), "{name}");
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::pseudo_terminal::Terminal;
 use crate::{bowden, command, result_of};
 
 /// Longest wait for what has to come soon.
-const PATIENCE: Duration = Duration::from_mins(2);
+pub const PATIENCE: Duration = Duration::from_mins(2);
 
 fn load(path: &Path) -> Recording {
     Recording::load(path, &ReadOptions::default()).unwrap()
