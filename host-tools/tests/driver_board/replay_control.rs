@@ -107,7 +107,7 @@ fn a_changed_cell_is_located_to_tick_and_signal() {
         board + 1
     );
     assert!(said.starts_with(&expected), "{said}\n{expected}");
-    // An input by one step: what follows from it is found in that tick or soon after, never before.
+    // One code of one input: what follows from it is found in that tick or soon after, never before.
     let said =
         replay(&with_cell(&text, run, "current_raw", |code| (code.parse::<i32>().unwrap() + 1).to_string()));
     let found: u64 = said.split("tick ").nth(1).unwrap().split(',').next().unwrap().parse().unwrap();
