@@ -73,6 +73,16 @@ impl Plugged {
 
     /// Runs `bowden <command> --port <terminal> --timeout 600 <arguments>` while the board runs.
     pub fn run(&mut self, command: &str, arguments: &[&str]) -> Outcome<Ran> {
+        self.run_beside(command, arguments, |_| ())
+    }
+
+    /// The same, with what `act` does to the board each time before it goes on.
+    pub fn run_beside(
+        &mut self,
+        command: &str,
+        arguments: &[&str],
+        act: impl FnMut(&mut Board),
+    ) -> Outcome<Ran> {
         let path = tool()?;
         let what = format!("{} {command} {}", path.display(), arguments.join(" "));
         let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
@@ -86,7 +96,7 @@ impl Plugged {
             .map_err(failed)?;
         // Another thread reads what it prints, so that it never waits for us.
         let waiting = std::thread::spawn(move || child.wait_with_output());
-        self.attend(&what, || waiting.is_finished())?;
+        self.attend_beside(&what, || waiting.is_finished(), act)?;
         let output = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
         let output = output.map_err(failed)?;
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -97,7 +107,16 @@ impl Plugged {
     ///
     /// Neither side depends on how fast this machine is: the board stands still while the terminal has no room for its bytes, and
     /// [`TIME_PER_REQUEST_S`] after the last request of the tool. A slow tool is therefore never silent and loses no sample.
-    pub fn attend(&mut self, what: &str, mut is_done: impl FnMut() -> bool) -> Outcome {
+    pub fn attend(&mut self, what: &str, is_done: impl FnMut() -> bool) -> Outcome {
+        self.attend_beside(what, is_done, |_| ())
+    }
+
+    fn attend_beside(
+        &mut self,
+        what: &str,
+        mut is_done: impl FnMut() -> bool,
+        mut act: impl FnMut(&mut Board),
+    ) -> Outcome {
         let end_s = self.board.time_s() + LIMIT_S;
         let mut allowed_until_s = self.board.time_s();
         let mut heard = Instant::now();
@@ -109,6 +128,7 @@ impl Plugged {
             // Without a port the board cannot be asked, and is on the way to one.
             let allowed = self.board.time_s() < allowed_until_s || !self.board.usb_ready();
             if allowed && !self.terminal.is_full() {
+                act(&mut self.board);
                 self.board.run_for(LOOK_S)?;
             } else {
                 std::thread::sleep(WAIT);
