@@ -29,16 +29,30 @@ def _text(notebook: nbformat.NotebookNode) -> str:
     return "\n".join(output.get("text", "") + "".join(output.get("data", {}).get("text/markdown", "")) for output in outputs)
 
 
+def _verdict(notebook: nbformat.NotebookNode) -> str:
+    """What the diagnosis says first, with the losses before and after."""
+    said = [line for line in _text(notebook).splitlines() if line.startswith("**")]
+    assert len(said) == 1
+    return said[0].partition(" (normalised error")[0]
+
+
+def _assert_committed_as(executed: nbformat.NotebookNode, name: str) -> None:
+    """What readers see without executing it is what executing it gives; the executed one is in BOWDEN_NOTEBOOKS, to be committed."""
+    assert _verdict(nbformat.read(NOTEBOOKS / name, as_version=4)) == _verdict(executed)
+
+
 def test_the_servo_lacks_friction_that_grows_with_load(tmp_path):
     notebook = _run("servo.ipynb", tmp_path)
     assert _pictures(notebook) == 5
     assert "gear_load_friction" in _text(notebook)
+    _assert_committed_as(notebook, "servo.ipynb")
 
 
 def test_a_drag_that_no_catalogue_lists_becomes_its_formula(virtual_bench, tmp_path):
     notebook = _run("law.ipynb", tmp_path)
     assert _pictures(notebook) == 3
     assert "joint_friction_nm = amplitude_nm * abs(omega_out_rad_s)^exponent" in _text(notebook)
+    _assert_committed_as(notebook, "law.ipynb")
 
 
 @pytest.mark.parametrize("name", ["servo.ipynb", "law.ipynb"])
