@@ -7,7 +7,7 @@ use clap::Args;
 use crate::parts::Parts;
 use crate::process::{self, built, cargo, target_folder, workspace};
 use crate::prove::provenance;
-use crate::{cross_target, firmware, system_packages};
+use crate::{cross_target, firmware, peers, system_packages};
 
 /// Which benchmarks are run.
 #[derive(Debug, Args)]
@@ -17,6 +17,10 @@ pub struct Options {
     /// Instead, measure what each correction of the board gains, and write host-tools/docs/corrections.md
     #[arg(long, conflicts_with_all = ["host", "board"])]
     corrections: bool,
+    /// Instead, measure speed and error beside MuJoCo, scipy, diffrax, the mcap crate, an f32 cascade and other tools of
+    /// identification, and write host-tools/docs/peers.md
+    #[arg(long, conflicts_with_all = ["host", "board", "corrections"])]
+    peers: bool,
     /// With --corrections: only effects whose names contain one of these; no page is written then
     #[arg(value_name = "EFFECT", requires = "corrections")]
     effects: Vec<OsString>,
@@ -59,6 +63,9 @@ const BENCHES: [(&str, &str, &str); 5] = [
 pub fn run(options: &Options) -> Result<(), String> {
     if options.corrections {
         return corrections(options);
+    }
+    if options.peers {
+        return peers::run();
     }
     let parts = options.parts;
     if parts.host() {

@@ -14,6 +14,7 @@ mod image_size;
 mod memory_map;
 mod paper;
 mod parts;
+mod peers;
 mod process;
 mod prove;
 mod python;

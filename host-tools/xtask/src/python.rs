@@ -35,11 +35,11 @@ pub fn tests(programs_are_built: bool) -> Result<String, String> {
         Err(reason) => return Ok(format!("skipped: {reason}")),
     };
     let folder = target_folder()?.join("python");
-    let environment = environment(&interpreter, &folder)?;
+    let environment = environment(&interpreter, &folder, "environment", "requirements.txt")?;
     if !programs_are_built {
         process::run(&mut cargo(&["build", "--package", "bowden", "--package", "virtual-bench"]), &[0])?;
     }
-    install_wheel(&environment, &folder)?;
+    install_wheel(&environment, &folder, "dev")?;
 
     let counts = folder.join("tests.xml");
     let notebooks = folder.join("notebooks");
@@ -60,11 +60,14 @@ pub fn tests(programs_are_built: bool) -> Result<String, String> {
     }
 }
 
-/// The environment with the pinned packages, made anew when these have changed.
-fn environment(interpreter: &Path, folder: &Path) -> Result<PathBuf, String> {
-    let requirements = workspace().join(PACKAGE).join("requirements.txt");
+/// The environment of a name with the pinned packages of a file of the package, made anew when these have changed.
+///
+/// # Errors
+/// When it cannot be made, or a package cannot be installed.
+pub fn environment(interpreter: &Path, folder: &Path, name: &str, packages: &str) -> Result<PathBuf, String> {
+    let requirements = workspace().join(PACKAGE).join(packages);
     let wanted = fs::read(&requirements).map_err(|error| format!("{}: {error}", requirements.display()))?;
-    let environment = folder.join("environment");
+    let environment = folder.join(name);
     let installed = environment.join("requirements.txt");
     if fs::read(&installed).is_ok_and(|there| there == wanted) {
         return Ok(environment);
@@ -78,13 +81,17 @@ fn environment(interpreter: &Path, folder: &Path) -> Result<PathBuf, String> {
     Ok(environment)
 }
 
-/// Builds the wheel and installs it. With the profile of the tests: what `pip install` builds for users is the same, optimised further.
-fn install_wheel(environment: &Path, folder: &Path) -> Result<(), String> {
+/// Builds the wheel and installs it. Tests take the profile of the other tests, `dev`: what `pip install` builds for users, `release`, is the
+/// same, optimised further.
+///
+/// # Errors
+/// When it does not build, or cannot be installed.
+pub fn install_wheel(environment: &Path, folder: &Path, profile: &str) -> Result<(), String> {
     let wheels = folder.join("wheels");
     // Of an earlier version nothing may be left that could be installed instead.
     let _ = fs::remove_dir_all(&wheels);
     let mut maturin = Command::new(program(environment, "maturin"));
-    maturin.current_dir(workspace()).args(["build", "--profile", "dev", "--locked", "--manifest-path"]);
+    maturin.current_dir(workspace()).args(["build", "--profile", profile, "--locked", "--manifest-path"]);
     maturin.arg(format!("{PACKAGE}/Cargo.toml")).arg("--out").arg(&wheels);
     maturin.arg("--interpreter").arg(program(environment, "python"));
     process::run(&mut maturin, &[0])?;
@@ -104,8 +111,8 @@ fn pip(environment: &Path) -> Command {
     pip
 }
 
-/// A program of the environment.
-fn program(environment: &Path, name: &str) -> PathBuf {
+/// A program of an environment.
+pub fn program(environment: &Path, name: &str) -> PathBuf {
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };
     environment.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
 }
