@@ -28,8 +28,8 @@ import bowden
 SECONDS = 20.0
 RATE_HZ = 100.0
 HELD_S = 0.1
-REPEATS = 7
-STEPS_S = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
+REPEATS = 5
+STEPS_S = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5)
 MUJOCO_STEPS_S = {"Euler": STEPS_S[:-1], "implicitfast": STEPS_S[:-1], "RK4": (1e-2, 5e-3, 2e-3, 1e-3, 5e-4)}
 ROPE_LOSS_S = 5e-4
 """Torque of a stretch rate over that of a stretch, s; the model of bowden's tendons has it built in (model/src/transmission.rs)."""

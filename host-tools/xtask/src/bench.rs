@@ -11,6 +11,8 @@ use crate::{cross_target, firmware, peers, system_packages};
 
 /// Which benchmarks are run.
 #[derive(Debug, Args)]
+// Switches of a command line.
+#[allow(clippy::struct_excessive_bools)]
 pub struct Options {
     #[command(flatten)]
     parts: Parts,
