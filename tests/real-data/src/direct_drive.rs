@@ -203,6 +203,13 @@ pub fn shown(data: &Path) -> Result<Vec<Shown>, Failure> {
     listed_recordings(&folder)?.into_iter().map(of).collect()
 }
 
+/// What `bowden diagnose` is asked: each recording by itself, and the first judged by the other.
+#[must_use]
+pub fn diagnosed_cases() -> [Case<'static>; 3] {
+    [(SWING_UP, vec![]), (POSITION_LOOP, vec![]), (SWING_UP, vec![POSITION_LOOP])]
+        .map(|(training, heldout)| Case { rig: RIG, training: vec![training], heldout })
+}
+
 /// Writes the tables and returns the mark.
 ///
 /// # Errors
@@ -265,9 +272,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     }
     print(table.to_string());
 
-    for (training, heldout) in [(SWING_UP, vec![]), (POSITION_LOOP, vec![]), (SWING_UP, vec![POSITION_LOOP])]
-    {
-        let case = Case { rig: RIG, training: vec![training], heldout };
+    for case in diagnosed_cases() {
         case.print(&data.join(FOLDER), &mut print)?;
     }
     Ok(vec![Mark {

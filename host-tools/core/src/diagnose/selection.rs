@@ -140,22 +140,27 @@ impl Selected {
         }
     }
 
-    /// The same search without the chosen effects of which hardly anything is left in `fitted`, the chosen ones fitted to
-    /// `objective` at the rig's own resolution; `None` where all are there.
+    /// The same search without one of the chosen effects that looks hardly there in `fitted`, the chosen ones fitted to `objective` at the
+    /// rig's own resolution, the last first.
     ///
     /// The search simulates coarsely, and an effect may make up for that alone: a spring of a few thousandths of a newton metre a
-    /// radian had ten times that strength there.
-    #[must_use]
-    pub fn without_faded(&self, objective: &Objective, fitted: &JointModel) -> Option<Self> {
+    /// radian had ten times that strength there. Whether it is worth its place, only a fit without it tells: the first parameter may have
+    /// left its work to another of the same effect.
+    pub fn without_faded(
+        &self,
+        objective: &Objective,
+        fitted: &JointModel,
+    ) -> impl Iterator<Item = Self> + use<> {
         let own = self.baseline.model.effects.len();
-        let mut left = self.clone();
-        for index in (0..self.chosen.len()).rev() {
-            if negligible(objective, &self.baseline.model, &fitted.effects[own + index]) {
-                left.chosen.remove(index);
-                left.model.effects.remove(own + index);
-            }
-        }
-        (left.chosen.len() < self.chosen.len()).then_some(left)
+        let faded = |index: &usize| negligible(objective, &self.baseline.model, &fitted.effects[own + index]);
+        let faded: Vec<usize> = (0..self.chosen.len()).rev().filter(faded).collect();
+        let all = self.clone();
+        faded.into_iter().map(move |index| {
+            let mut left = all.clone();
+            left.chosen.remove(index);
+            left.model.effects.remove(own + index);
+            left
+        })
     }
 }
 

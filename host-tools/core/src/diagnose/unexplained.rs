@@ -47,6 +47,21 @@ pub(crate) fn unexplained(
     Ok(found(objective, &samples, judging.as_ref(), &residuals))
 }
 
+/// The same where what `model` leaves of a channel is beyond what any bench without concealed physics leaves ([`LEFT_OVER`]).
+///
+/// # Errors
+/// When the model cannot be driven.
+pub(crate) fn far_off(
+    objective: &Objective,
+    judging: Option<&Objective>,
+    model: &JointModel,
+) -> Result<Option<Unexplained>, Failure> {
+    match loudest(objective, &objective.residuals(model)?) {
+        Some(_) => unexplained(objective, judging, model),
+        None => Ok(None),
+    }
+}
+
 fn found(
     objective: &Objective,
     samples: &Samples,
