@@ -6,13 +6,13 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use bowden_control::conformance::amt22_frame;
+use bowden_control::conformance::{Orders, SINE, SteadyJoint};
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
-use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
+use bowden_control::tick::{Command, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
-use bowden_link::message::{Goal, Mode, Reference, Shape};
+use bowden_link::message::{Goal, Mode};
 
 const TICKS: u32 = 1_000_000;
 const REPEATS: usize = 7;
@@ -75,53 +75,34 @@ impl Cascade {
     }
 }
 
-/// At most one command.
-struct Orders(Option<Command>);
-
-impl Inbox for Orders {
-    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
-        self.0.take().map(|command| act(&command))
-    }
-
-    fn stream_point(&mut self) -> Option<i32> {
-        None
-    }
-}
-
-/// A joint whose encoders follow the reference, with tensions and current at rest.
+/// A controller that runs on [`SteadyJoint`].
 struct Bench {
     controller: Controller,
     orders: Orders,
-    random: u32,
-    sequence: u8,
-    reference_raw: i32,
+    joint: SteadyJoint,
 }
 
 impl Bench {
-    /// A controller that runs on a sine of 0.5 rad at 0.2 Hz.
+    /// Self test and pretension check done, in position mode.
     fn running() -> Self {
         let parameters = Parameters::default();
         let config = tick_config(&parameters).expect("default parameters are allowed");
         let mut bench = Self {
             controller: Controller::new(config),
-            orders: Orders(None),
-            random: 1,
-            sequence: 0,
-            reference_raw: 0,
+            orders: Orders::default(),
+            joint: SteadyJoint::new(),
         };
         bench.tick();
-        bench.orders.0 = Some(Command::Enter(Goal::Ready));
+        bench.orders.command = Some(Command::Enter(Goal::Ready));
         for _ in 0..100_000 {
             if bench.controller.state() == State::Ready {
                 break;
             }
             bench.tick();
         }
-        let sine =
-            Reference::Generated { shape: Shape::Sine, amplitude: 0.5, offset: 0.0, frequency_hz: 0.2 };
-        let sine = reference_config(&parameters, sine).expect("the sine is within limits");
+        let sine = reference_config(&parameters, SINE).expect("the sine is within limits");
         for command in [Command::SetReference(sine), Command::Enter(Goal::Run(Mode::Position))] {
-            bench.orders.0 = Some(command);
+            bench.orders.command = Some(command);
             bench.tick();
         }
         bench.assert_runs();
@@ -132,31 +113,9 @@ impl Bench {
         assert!(self.controller.state() == State::Run, "the controller is in {:?}", self.controller.state());
     }
 
-    /// 0 to below `range`.
-    const fn below(&mut self, range: u32) -> u16 {
-        self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (((self.random >> 16) * range) >> 16) as u16
-    }
-
     fn tick(&mut self) -> TickOutput {
-        self.sequence = self.sequence.wrapping_add(1);
-        // 4096 counts a turn, the reference in 2⁻²⁰ rad.
-        let turned = (i64::from(self.reference_raw) * 652) >> 20;
-        let encoder = [1000, 2000].map(|zero| EncoderWord {
-            frame_raw: amt22_frame((zero + turned) as u32),
-            sequence: self.sequence,
-            bus_error: false,
-        });
-        let input = TickInput {
-            encoder,
-            // 30 N ± 0.5 N; a code that stays the same is a fault.
-            tension_raw: [0; 4].map(|_| 1463 + self.below(28)),
-            current_raw: 2043 + self.below(10),
-            bus_raw: 2700 + self.below(16),
-            bridge_fault: false,
-        };
-        let output = self.controller.tick(black_box(&input), &mut self.orders);
-        self.reference_raw = output.sample.reference_raw;
+        let output = self.controller.tick(black_box(&self.joint.input()), &mut self.orders);
+        self.joint.follow(&output);
         output
     }
 }

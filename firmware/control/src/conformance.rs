@@ -5,6 +5,7 @@
 //! workstation that print the same number for the same seed have computed the same.
 
 mod corrections;
+mod steady_joint;
 mod table;
 
 use bowden_link::message::{Goal, Mode, Reference, Shape};
@@ -19,6 +20,7 @@ use crate::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
 use crate::{reference_config, tick_config};
 
 pub use corrections::correction_digest;
+pub use steady_joint::{SINE, SteadyJoint};
 pub use table::ripple_table_digest;
 
 /// What a run came by.
@@ -275,9 +277,12 @@ struct World {
 }
 
 /// At most a command and a stream point.
-struct Orders {
-    command: Option<Command>,
-    point: Option<i32>,
+#[derive(Clone, Debug, Default)]
+pub struct Orders {
+    /// For the next tick.
+    pub command: Option<Command>,
+    /// The same.
+    pub point: Option<i32>,
 }
 
 impl Inbox for Orders {

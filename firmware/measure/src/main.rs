@@ -30,15 +30,15 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use bowden_control::compensator::float::{FloatCompensator, FloatInput, FloatState, compensate_float};
 use bowden_control::compensator::{Compensator, CompensatorInput, CompensatorState, compensate};
 use bowden_control::conformance::{
-    amt22_frame, compensator_digest, correction_digest, ripple_table_digest, run,
+    Orders, SINE, SteadyJoint, compensator_digest, correction_digest, ripple_table_digest, run,
 };
 use bowden_control::controller::Controller;
 use bowden_control::parameters::Parameters;
 use bowden_control::scale::{Angle, Quantity, Speed, Torque};
-use bowden_control::tick::{Command, EncoderWord, Inbox, TickInput, TickOutput};
+use bowden_control::tick::{Command, TickInput, TickOutput};
 use bowden_control::{reference_config, tick_config};
 use bowden_link::State;
-use bowden_link::message::{Goal, Mode, Reference, Shape};
+use bowden_link::message::{Goal, Mode};
 
 /// Seed of the digests.
 const SEED: u32 = 20_260;
@@ -104,27 +104,12 @@ fn control_tick(controller: &mut Controller, input: &TickInput, orders: &mut Ord
     controller.tick(input, orders)
 }
 
-/// At most one command.
-struct Orders(Option<Command>);
-
-impl Inbox for Orders {
-    fn command<R>(&mut self, act: impl FnOnce(&Command) -> R) -> Option<R> {
-        self.0.take().map(|command| act(&command))
-    }
-
-    fn stream_point(&mut self) -> Option<i32> {
-        None
-    }
-}
-
-/// A joint whose encoders follow the reference, with tensions and current at rest.
+/// A controller that runs on [`SteadyJoint`].
 struct Bench {
     parameters: Parameters,
     controller: Controller,
     orders: Orders,
-    random: u32,
-    sequence: u8,
-    reference_raw: i32,
+    joint: SteadyJoint,
 }
 
 impl Bench {
@@ -133,53 +118,30 @@ impl Bench {
         parameters.compensator.source = f32::from(source);
         let Ok(config) = tick_config(&parameters) else { stop() };
         let controller = Controller::new(config);
-        Self { parameters, controller, orders: Orders(None), random: 1, sequence: 0, reference_raw: 0 }
+        Self { parameters, controller, orders: Orders::default(), joint: SteadyJoint::new() }
     }
 
-    /// 0 to below `range`, at most 2¹⁶.
-    fn below(&mut self, range: u32) -> u32 {
-        self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        ((self.random >> 16) * range) >> 16
-    }
-
-    /// Self test, pretension check, then a sine of 0.5 rad at 0.2 Hz.
+    /// Self test, pretension check, then the sine.
     fn reach_run(&mut self) {
         self.tick();
-        self.orders.0 = Some(Command::Enter(Goal::Ready));
+        self.orders.command = Some(Command::Enter(Goal::Ready));
         while self.controller.state() != State::Ready {
             self.tick();
             if self.controller.state() == State::Fault {
                 stop();
             }
         }
-        let sine =
-            Reference::Generated { shape: Shape::Sine, amplitude: 0.5, offset: 0.0, frequency_hz: 0.2 };
-        let Ok(sine) = reference_config(&self.parameters, sine) else { stop() };
+        let Ok(sine) = reference_config(&self.parameters, SINE) else { stop() };
         for command in [Command::SetReference(sine), Command::Enter(Goal::Run(Mode::Position))] {
-            self.orders.0 = Some(command);
+            self.orders.command = Some(command);
             self.tick();
         }
     }
 
     fn tick(&mut self) {
-        self.sequence = self.sequence.wrapping_add(1);
-        // 4096 counts a turn, the reference in 2⁻²⁰ rad.
-        let turned = (i64::from(self.reference_raw) * 652) >> 20;
-        let encoder = [1000, 2000].map(|zero| EncoderWord {
-            frame_raw: amt22_frame((zero + turned) as u32),
-            sequence: self.sequence,
-            bus_error: false,
-        });
-        let input = TickInput {
-            encoder,
-            // 30 N ± 0.5 N.
-            tension_raw: [0; 4].map(|_| (1463 + self.below(28)) as u16),
-            current_raw: (2043 + self.below(10)) as u16,
-            bus_raw: (2700 + self.below(16)) as u16,
-            bridge_fault: false,
-        };
+        let input = self.joint.input();
         let output = control_tick(&mut self.controller, black_box(&input), &mut self.orders);
-        self.reference_raw = output.sample.reference_raw;
+        self.joint.follow(&output);
     }
 
     /// Both compensators on the same inputs: angles within 2 rad, speeds within 2 rad/s, torques within 2 N·m.
@@ -188,7 +150,7 @@ impl Bench {
         let float = FloatCompensator::new(&self.parameters);
         let (mut fixed_state, mut float_state) = (CompensatorState::default(), FloatState::default());
         for _ in 0..CALLS {
-            let mut small = || (self.below(1 << 16).cast_signed() << 6) - (1 << 21);
+            let mut small = || (self.joint.below(1 << 16).cast_signed() << 6) - (1 << 21);
             let input = CompensatorInput {
                 theta_d: Angle::from_bits(small()),
                 omega_d: Speed::from_bits(small()),
