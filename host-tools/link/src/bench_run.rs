@@ -7,7 +7,7 @@ pub mod excitation;
 pub mod ledger;
 pub mod plan_file;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use bowden_control::parameters::{Parameters, Reach};
@@ -15,7 +15,7 @@ use bowden_core::outcome::Failure;
 use bowden_core::progress::Progress;
 use bowden_core::recording::Format;
 
-use crate::capture::{Capture, PROGRESS_STEPS, sidecar};
+use crate::capture::{Capture, PROGRESS_STEPS};
 use crate::course::Course;
 use crate::error::LinkError;
 use crate::evidence::Origin;
@@ -25,9 +25,6 @@ use plan_file::{Motion, Plan, Step};
 
 /// Longest wait for something from the board during a pause.
 const LOOK: Duration = Duration::from_millis(20);
-
-/// Endings of the recordings that a run may leave.
-pub const ENDINGS: [&str; 3] = ["csv", "csv.gz", "mcap"];
 
 /// One thing to do, with the name of what it leaves.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +52,7 @@ pub enum Action {
 pub struct Setting<'s> {
     /// Folder of recordings, ledger and summary.
     pub folder: &'s Path,
-    /// Ending of recordings, one of [`ENDINGS`].
+    /// Ending of recordings: `csv`, `csv.gz`, `mcap`.
     pub ending: &'s str,
     /// What recordings say of themselves; plan and step are added.
     pub origin: &'s Origin,
@@ -176,12 +173,7 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
     let name = format!("{}.{ending}", item.name);
     let out = folder.join(&name);
     // `kill -9` and a power cut leave rows that no entry of the ledger tells of, perhaps in another format. Before anything moves.
-    for ending in ENDINGS {
-        let left = folder.join(format!("{}.{ending}", item.name));
-        if left.exists() {
-            put_aside(&left)?;
-        }
-    }
+    put_aside(folder, &item.name)?;
     progress.stage(&format!("{}: pretension check and homing", item.name), 0);
     session.ready(stop)?;
     session.home(stop)?;
@@ -202,13 +194,13 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
         replug: None,
     };
     let (tally, end) = capture.run(session, &Course::OnBoard(motion.reference()), stop, progress)?;
-    let kept = |what: String| match put_aside(&out) {
-        Ok(aside) => Failure::failed(format!(
+    let kept = |what: String| match put_aside(folder, &item.name) {
+        Ok(number) => Failure::failed(format!(
             "{what} ({} after {:.3} s); {} rows are kept in {}",
             item.name,
             tally.duration_s(),
             tally.rows,
-            aside.display()
+            folder.join(aside(&item.name, number, ending)).display()
         )),
         Err(failure) => failure,
     };
@@ -226,29 +218,29 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
     }
 }
 
-/// Renames what was recorded of a step that was stopped, with what stands beside it; the step is done again. Nothing is overwritten.
-fn put_aside(out: &Path) -> Result<PathBuf, Failure> {
-    let beside = bowden_core::recording::Metadata::file_beside(out);
-    // The recording last: while it has its name, what is beside it is still to be kept.
-    let files: Vec<PathBuf> =
-        [beside, Some(sidecar(out)), Some(out.to_owned())].into_iter().flatten().collect();
-    let aside = |path: &Path, number: u32| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
-        path.with_file_name(format!("{stem}.stopped-{number}.{ending}"))
+/// Name of what was left of a step that did not end, by the number of its start.
+fn aside(step: &str, number: u32, ending: &str) -> String {
+    format!("{step}.stopped-{number}.{ending}")
+}
+
+/// Renames all that was left of a step that did not end, a recording of any format and what stands beside it; the step is done again. Every
+/// start has a number of its own, which is returned, so that nothing is overwritten.
+fn put_aside(folder: &Path, step: &str) -> Result<u32, Failure> {
+    let failed = |path: &Path, what: &str, error: &std::io::Error| {
+        let reason = bowden_core::output::describe(error);
+        Failure::failed(format!("{}: cannot be {what}: {reason}; it is kept as it is", path.display()))
     };
-    // A number for each start, whatever formats they wrote: recordings of two formats share the names of what is beside them.
-    let stem = out.with_extension("").with_extension("");
-    let taken = |number: u32| {
-        let others = ENDINGS.iter().map(|ending| stem.with_extension(ending));
-        files.iter().cloned().chain(others).any(|path| aside(&path, number).exists())
-    };
-    let number = (1..=u32::MAX).find(|number| !taken(*number)).unwrap_or(u32::MAX);
-    for path in files.iter().filter(|path| path.exists()) {
-        std::fs::rename(path, aside(path, number)).map_err(|error| {
-            let reason = bowden_core::output::describe(&error);
-            Failure::failed(format!("{}: cannot be renamed: {reason}; it is kept as it is", path.display()))
-        })?;
+    let entries = std::fs::read_dir(folder).map_err(|error| failed(folder, "read", &error))?;
+    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let endings: Vec<String> =
+        names.filter_map(|name| name.strip_prefix(step)?.strip_prefix('.').map(str::to_owned)).collect();
+    let number_of =
+        |ending: &str| -> Option<u32> { ending.strip_prefix("stopped-")?.split_once('.')?.0.parse().ok() };
+    let number = endings.iter().filter_map(|ending| number_of(ending)).max().unwrap_or(0) + 1;
+    for ending in endings.iter().filter(|ending| number_of(ending).is_none()) {
+        let left = folder.join(format!("{step}.{ending}"));
+        std::fs::rename(&left, folder.join(aside(step, number, ending)))
+            .map_err(|error| failed(&left, "renamed", &error))?;
     }
-    Ok(aside(out, number))
+    Ok(number)
 }
