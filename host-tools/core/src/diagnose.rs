@@ -230,7 +230,7 @@ impl Case<'_> {
         let refined =
             |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
         let mut last = refined(&selected.model)?;
-        while let Some((fewer, without)) = self.without_a_faded_one(&selected, &last, &refined)? {
+        while let Some((fewer, without)) = self.without_a_faded_one(&selected, &last, refined)? {
             (selected, last) = (fewer, without);
         }
         let recalibrated = Stage::of(judge, &at_full_resolution(&selected.baseline.model, model))?;

@@ -11,8 +11,11 @@ use super::locate::{Answer, component};
 use super::samples::{Left, Samples, Variable};
 use super::shape::{Factor, Shape, best_spot};
 use super::structure::{frequencies_hz, strongest};
-use super::{Unexplained, described};
-use crate::fit::objective::Series;
+use super::{Unexplained, described, far_off};
+use crate::fit::objective::{Objective, Series};
+use crate::joint_model::JointModel;
+use crate::simulation::{ReplayInput, replay};
+use crate::test_bench;
 
 /// Rows of a table: 40 s.
 const ROWS: usize = 4000;
@@ -281,4 +284,22 @@ fn what_swings_in_one_recording_of_several_is_no_structure() {
     };
     assert_eq!(of(0.0), None);
     assert!(matches!(of(1.0), Some(Shape::Wave { of: Variable::Time, .. })), "in both");
+}
+
+/// Tensions that are half as high again as they are read stand tens of scales off in every block.
+#[test]
+fn a_rig_that_is_far_off_leaves_something_and_the_right_one_does_not() {
+    let mut recording = test_bench::swung(8000);
+    let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let measured = replay(&bench, &ReplayInput::new(&bench, &recording).unwrap()).unwrap();
+    for (channel, values) in measured.channels() {
+        recording.set(channel, values.to_vec());
+    }
+    let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+    assert_eq!(far_off(&objective, None, &bench).unwrap(), None);
+    let mut tight = bench.clone();
+    tight.parameters.tendon.as_mut().unwrap().pretension_n *= 1.5;
+    let left = far_off(&objective, None, &tight).unwrap().unwrap();
+    // Tensions, and the torque that they make: tighter tendons rub more.
+    assert_eq!(left.component, "transmission", "{}", left.sentence);
 }
