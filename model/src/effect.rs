@@ -351,6 +351,13 @@ pub trait Effect: Sync {
         self.descriptor().neutral.is_some_and(|neutral| is_weak(parameters[0], neutral, usual))
     }
 
+    /// What it is where it is hardly there as itself ([`Self::is_hardly_there`]): another effect, by its id, with its first parameter; `None` where
+    /// nothing is left of it.
+    fn remainder(&self, parameters: &[f64; MAX_PARAMETERS]) -> Option<(&'static str, f64)> {
+        let _ = parameters;
+        None
+    }
+
     /// Parameter in which several instances of it on one part differ, a ratio of 5 % at least; `None` where a part has it once.
     fn instances_differ_in(&self) -> Option<&'static str> {
         None

@@ -230,8 +230,11 @@ impl Case<'_> {
         let refined =
             |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
         let mut last = refined(&selected.model)?;
-        while let Some((fewer, without)) = self.without_a_faded_one(&selected, &last, refined)? {
-            (selected, last) = (fewer, without);
+        while let Some(fewer) =
+            selected.complete.then(|| selected.without_faded(objective, &last.model)).flatten()
+        {
+            selected = fewer;
+            last = refined(&selected.model)?;
         }
         let recalibrated = Stage::of(judge, &at_full_resolution(&selected.baseline.model, model))?;
         if selected.complete
@@ -262,27 +265,6 @@ impl Case<'_> {
         let traces = stages::traces(judge, model, &last.model)?;
         let left = Left { hums, unexplained };
         self.report(&selected, &last, &stages, left, traces)
-    }
-
-    /// The search and its fit without a chosen effect that looks hardly there in `last`, and without which the fit is not worse by what a
-    /// name is worth; `None` where there is none.
-    fn without_a_faded_one(
-        &self,
-        selected: &Selected,
-        last: &Solution,
-        refined: impl Fn(&JointModel) -> Result<Solution, Failure>,
-    ) -> Result<Option<(Selected, Solution)>, Failure> {
-        let loss = |solution: &Solution| self.objective.mean_loss(&solution.residuals, Part::Training);
-        if !selected.complete {
-            return Ok(None);
-        }
-        for fewer in selected.without_faded(self.objective, &last.model) {
-            let without = refined(&fewer.model)?;
-            if !POLICY.worth_naming(loss(&without), loss(last)) {
-                return Ok(Some((fewer, without)));
-            }
-        }
-        Ok(None)
     }
 }
 

@@ -42,6 +42,10 @@ impl Effect for MotorStribeckFriction {
         p[0] < (0.3 * p[2]).max(NAMED_STRENGTH * usual)
     }
 
+    fn remainder(&self, p: &[f64; MAX_PARAMETERS]) -> Option<(&'static str, f64)> {
+        Some(("motor_coulomb_friction", p[2]))
+    }
+
     fn told_apart_by(&self) -> Option<&'static str> {
         Some("constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded")
     }

@@ -135,8 +135,8 @@ fn a_quasi_direct_drive_swings_as_its_reported_torque_says() {
     assert!(shown[1].spike_share > 0.3 && shown[1].spikes < 0.1, "{shown:?}");
 }
 
-/// From a rig file without friction: the swing-up asks for dry friction of the motor, published as 0.1839 N m. What it falls to at a crawl may
-/// be little of it; the diagnosis once took the whole for that little, and then said that nothing is missing.
+/// From a rig file without friction: the swing-up asks for dry friction of the motor, published as 0.1839 N m. The search begins with friction that
+/// falls with speed, of which the final fit leaves the dry part.
 #[test]
 fn the_dry_friction_of_a_quasi_direct_drive_is_named() {
     let Some(data) = data(direct_drive::FOLDER) else { return };
@@ -144,8 +144,8 @@ fn the_dry_friction_of_a_quasi_direct_drive_is_named() {
     let diagnosis = swing_up.diagnose(&data.join(direct_drive::FOLDER)).unwrap();
     println!("{}", bowden_real_data::diagnosed::said(&diagnosis));
     let [friction] = &diagnosis.effects[..] else { panic!("{:?}", diagnosis.effects) };
-    assert_eq!(friction.id, "motor_stribeck_friction");
-    let dry_nm = friction.parameters["coulomb_nm"].value;
+    assert_eq!(friction.id, "motor_coulomb_friction");
+    let dry_nm = friction.parameters["torque_nm"].value;
     assert!((dry_nm - 0.1839).abs() < 0.05, "{friction:?}");
     let fit = &diagnosis.fit.channels["theta_out_rad"];
     assert!(fit.after_rmse < 0.5 * fit.recalibrated_rmse, "{fit:?}");

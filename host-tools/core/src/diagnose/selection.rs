@@ -17,6 +17,7 @@ mod trying;
 use std::cmp::Ordering;
 
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
+use bowden_model::effects::find;
 use rayon::prelude::*;
 
 use super::hypotheses::Asked;
@@ -25,7 +26,7 @@ use super::locked::too_little_travel;
 use super::policy::{POLICY, Policy};
 use crate::fit::objective::{Objective, Part, StretchLosses};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
-use crate::fit::typical::typical;
+use crate::fit::typical::{sized, typical};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
@@ -93,6 +94,15 @@ pub struct Chosen {
 }
 
 impl Chosen {
+    /// Another effect in its place, which is no rival of itself then.
+    fn becomes(&mut self, other: ActiveEffect) {
+        self.others.retain(|tried| !tried.effect.is_beside(&other));
+        for model in [&mut self.model, &mut self.compared[1]] {
+            model.effects.iter_mut().filter(|one| one.is_beside(&self.effect)).for_each(|one| *one = other);
+        }
+        self.effect = other;
+    }
+
     /// Its worth beside all that was found; rivals keep their odds.
     fn stands(&mut self, before: &Fitted, after: &Fitted) {
         for tried in &mut self.others {
@@ -140,27 +150,31 @@ impl Selected {
         }
     }
 
-    /// The same search without one of the chosen effects that looks hardly there in `fitted`, the chosen ones fitted to `objective` at the
-    /// rig's own resolution, the last first.
+    /// The same search without the chosen effects of which hardly anything is left in `fitted`, the chosen ones fitted to
+    /// `objective` at the rig's own resolution; `None` where all are there. What is left as another effect takes the place of the one.
     ///
     /// The search simulates coarsely, and an effect may make up for that alone: a spring of a few thousandths of a newton metre a
-    /// radian had ten times that strength there. Whether it is worth its place, only a fit without it tells: the first parameter may have
-    /// left its work to another of the same effect.
-    pub fn without_faded(
-        &self,
-        objective: &Objective,
-        fitted: &JointModel,
-    ) -> impl Iterator<Item = Self> + use<> {
-        let own = self.baseline.model.effects.len();
-        let faded = |index: &usize| negligible(objective, &self.baseline.model, &fitted.effects[own + index]);
-        let faded: Vec<usize> = (0..self.chosen.len()).rev().filter(faded).collect();
-        let all = self.clone();
-        faded.into_iter().map(move |index| {
-            let mut left = all.clone();
-            left.chosen.remove(index);
-            left.model.effects.remove(own + index);
-            left
-        })
+    /// radian had ten times that strength there.
+    #[must_use]
+    pub fn without_faded(&self, objective: &Objective, fitted: &JointModel) -> Option<Self> {
+        let believed = &self.baseline.model;
+        let own = believed.effects.len();
+        let mut left = self.clone();
+        for index in (0..self.chosen.len()).rev() {
+            let effect = &fitted.effects[own + index];
+            if !negligible(objective, believed, effect) {
+                continue;
+            }
+            let remainder = remainder(believed, effect);
+            if let Some(other) = remainder.filter(|other| !negligible(objective, believed, other)) {
+                left.model.effects[own + index] = other;
+                left.chosen[index].becomes(other);
+            } else {
+                left.chosen.remove(index);
+                left.model.effects.remove(own + index);
+            }
+        }
+        (left.model != self.model).then_some(left)
     }
 }
 
@@ -487,6 +501,14 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
     for place in places.iter().rev() {
         chosen.remove(*place);
     }
+}
+
+/// What is left of an effect that is hardly there as itself.
+fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffect> {
+    let (id, strength) = effect.effect.remainder(&effect.parameters)?;
+    let mut other = ActiveEffect { target: effect.target, ..sized(believed, find(id)?) };
+    other.parameters[0] = strength;
+    Some(other)
 }
 
 /// Factor of the loss with an effect, where candidates are compared.

@@ -4,12 +4,72 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 use nalgebra::DMatrix;
 
-use super::{Losses, Selected, handicap, largest_ordinary, negligible};
+use super::{Chosen, Losses, Selected, Tried, handicap, largest_ordinary, negligible};
 use crate::diagnose::policy::Policy;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
 use crate::test_bench;
+
+fn nothing_found(bench: &JointModel) -> Selected {
+    Selected {
+        baseline: Solution {
+            model: bench.clone(),
+            values: Vec::new(),
+            stds: Vec::new(),
+            residuals: Residuals { values: Vec::new() },
+            spread: 1.0,
+            jacobian: DMatrix::zeros(0, 0),
+        },
+        plain: bench.clone(),
+        searched: bench.clone(),
+        ordinary: Vec::new(),
+        model: bench.clone(),
+        chosen: Vec::new(),
+        rounds: Vec::new(),
+        trials: Vec::new(),
+        complete: true,
+    }
+}
+
+/// Friction whose excess at a crawl is a sixth of what is left at speed is dry friction; where hardly any of either is there, nothing is left.
+#[test]
+fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
+    let recording = test_bench::swung(2000);
+    let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+    let falling = |excess_nm: f64, coulomb_nm: f64| {
+        ActiveEffect::with_defaults(find("motor_stribeck_friction").unwrap())
+            .with("excess_nm", excess_nm)
+            .with("coulomb_nm", coulomb_nm)
+    };
+    let with = |effect| JointModel { effects: vec![effect], ..bench.clone() };
+    let found = falling(0.5, 0.07);
+    let rival =
+        |id| Tried { effect: ActiveEffect::with_defaults(find(id).unwrap()), model: with(found), loss: 2.0 };
+    let selected = Selected {
+        model: with(found),
+        chosen: vec![Chosen {
+            effect: found,
+            model: with(found),
+            loss_before: 9.0,
+            loss_after: 1.0,
+            compared: [bench.clone(), with(found)],
+            others: vec![rival("motor_coulomb_friction"), rival("gear_load_friction")],
+        }],
+        ..nothing_found(&bench)
+    };
+    assert!(selected.without_faded(&objective, &with(falling(0.5, 0.07))).is_none());
+    let left = selected.without_faded(&objective, &with(falling(0.026, 0.159))).unwrap();
+    let [dry] = left.model.effects[..] else { panic!("{:?}", left.model.effects) };
+    assert_eq!((dry.descriptor().id, dry.parameters[0]), ("motor_coulomb_friction", 0.159));
+    let [chosen] = &left.chosen[..] else { panic!("{:?}", left.chosen) };
+    assert_eq!((chosen.effect, &chosen.model, &chosen.compared[1]), (dry, &with(dry), &with(dry)));
+    let ids: Vec<&str> = chosen.others.iter().map(|tried| tried.effect.descriptor().id).collect();
+    assert_eq!(ids, ["gear_load_friction"]);
+    let left = selected.without_faded(&objective, &with(falling(1e-4, 1e-4))).unwrap();
+    assert!(left.chosen.is_empty() && left.model.effects.is_empty());
+}
 
 #[test]
 fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig() {
@@ -19,22 +79,11 @@ fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig
     let (before, after) = (effect("motor_coulomb_friction"), effect("presliding_compliance"));
     let found = effect("joint_spring");
     let selected = Selected {
-        baseline: Solution {
-            model: bench.clone(),
-            values: Vec::new(),
-            stds: Vec::new(),
-            residuals: Residuals { values: Vec::new() },
-            spread: 1.0,
-            jacobian: DMatrix::zeros(0, 0),
-        },
         plain: with(&[before]),
         searched: with(&[after, found]),
         ordinary: vec![after],
         model: with(&[found]),
-        chosen: Vec::new(),
-        rounds: Vec::new(),
-        trials: Vec::new(),
-        complete: true,
+        ..nothing_found(&bench)
     };
     let withdrawn = selected.withdrawn();
     assert_eq!(withdrawn.ordinary, [before]);
