@@ -275,7 +275,17 @@ fn suffer(provocation: Provocation) {
             }
         }),
         Provocation::LateTick => tick::provoke_late(),
+        Provocation::StackOverflow => {
+            descend(0);
+        }
     }
+}
+
+/// Calls itself until the stack ends; each call takes a quarter of a kilobyte.
+#[inline(never)]
+fn descend(depth: u32) -> u32 {
+    let taken = core::hint::black_box([depth; 64]);
+    if depth == u32::MAX { 0 } else { descend(depth + 1).wrapping_add(taken[(depth % 64) as usize]) }
 }
 
 fn now_ms() -> u32 {

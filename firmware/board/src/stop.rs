@@ -1,5 +1,6 @@
 //! The end of a run: motor off, words kept and logged, reset.
 
+use core::arch::naked_asm;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -41,10 +42,45 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     reset_with(Fault::Panic)
 }
 
-#[exception]
-#[allow(unsafe_code, reason = "the macro asks for an unsafe function")]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+/// Stack that [`processor_fault`] takes, with room to spare, bytes.
+const ROOM: u32 = 1024;
+
+/// Where the processor goes when it cannot go on: of a stack that has run over its end nothing is left for a function to stand on.
+#[allow(unsafe_code, reason = "the entry of a vector, before there is a stack")]
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+#[unsafe(link_section = ".HardFault.user")]
+unsafe extern "C" fn hard_fault() -> ! {
+    naked_asm!(
+        "mrs r0, msp",
+        "movw r1, #:lower16:_stack_end",
+        "movt r1, #:upper16:_stack_end",
+        "add.w r1, r1, #{room}",
+        "cmp r0, r1",
+        "bhs 0f",
+        "movw r1, #:lower16:_stack_start",
+        "movt r1, #:upper16:_stack_start",
+        "msr msp, r1",
+        "b {stack_overflow}",
+        "0:",
+        "b {processor_fault}",
+        room = const ROOM,
+        stack_overflow = sym stack_overflow,
+        processor_fault = sym processor_fault,
+    )
+}
+
+/// The stack is at its end, or so near that nothing more fits; it is taken anew from its start.
+extern "C" fn stack_overflow(stack_pointer: u32) -> ! {
     bridge::off();
+    retained::keep(Fault::StackOverflow, format_args!("stack pointer {stack_pointer:#010x}"));
+    cortex_m::interrupt::disable();
+    reset_with(Fault::StackOverflow)
+}
+
+extern "C" fn processor_fault(frame: &ExceptionFrame) -> ! {
+    bridge::off();
+    #[allow(unsafe_code, reason = "a register of the core")]
     // Safety: reading it changes nothing.
     let status = unsafe { (*SCB::PTR).cfsr.read() };
     retained::keep(

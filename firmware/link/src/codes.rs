@@ -139,6 +139,7 @@ faults! {
     42 HomingTimeout "s" "the joint did not reach angle zero in time" "look for a blocked joint or a wrong encoder direction";
     50 FlashBanks "banks" "the flash is set up as one bank, so that nothing can be stored" "set the option bit DBANK and flash the image again";
     51 RestartLoop "resets" "the board restarted again and again before a host was there" "read the panic text, then reset the board; report this if it comes back";
+    52 StackOverflow "" "the firmware's stack ran over its end" "report this with the panic text";
 }
 
 /// A fault with its numbers.

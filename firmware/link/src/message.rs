@@ -292,6 +292,8 @@ pub enum Provocation {
     Hang,
     /// One control tick takes longer than its period.
     LateTick,
+    /// A function calls itself until the stack ends.
+    StackOverflow,
 }
 
 /// What a reference means.

@@ -35,7 +35,10 @@ pub fn read(path: &Path) -> Result<Vec<Region>, String> {
 
 fn parse(text: &str) -> Result<Vec<Region>, String> {
     let mut regions = Vec::new();
-    for line in without_comments(text).lines().map(str::trim).filter(|line| line.contains("ORIGIN")) {
+    let text = without_comments(text);
+    // A line that ends with a semicolon gives a symbol its value.
+    let of_regions = |line: &&str| line.contains("ORIGIN") && !line.ends_with(';');
+    for line in text.lines().map(str::trim).filter(of_regions) {
         let region = region(line).ok_or_else(|| {
             format!("`{line}` is no region; expected `NAME : ORIGIN = 0x..., LENGTH = ...K`")
         })?;
@@ -84,7 +87,7 @@ mod tests {
     #[test]
     fn regions_are_read_past_comments_and_attributes() {
         let text = "/* 16 : ORIGIN */\nMEMORY\n{\n  FLASH (rx) : ORIGIN = 0x08000000, LENGTH = 512K /* all\n of it */\n\
-                    RAM : ORIGIN = 0x20000000, LENGTH = 98304\n}\n";
+                    RAM : ORIGIN = 0x20000000, LENGTH = 98304\n}\n_end = ORIGIN(RAM);\n";
         let flash = Region { name: "FLASH".into(), origin: 0x0800_0000, length: 524_288 };
         let ram = Region { name: "RAM".into(), origin: 0x2000_0000, length: 98_304 };
         assert_eq!(parse(text), Ok(vec![flash, ram]));
@@ -94,7 +97,7 @@ mod tests {
     fn the_workspaces_own_file_is_understood() {
         let regions = read(&crate::process::workspace().join("memory.x")).unwrap();
         let names: Vec<_> = regions.iter().map(|region| region.name.as_str()).collect();
-        assert_eq!(names, ["FLASH", "RAM", "CCM"]);
+        assert_eq!(names, ["FLASH", "STACK", "RAM", "CCM"]);
         // The first address of the stores is fixed: two pages of 2 KiB for the table, and the last four.
         let flash = &regions[0];
         assert_eq!(flash.origin + flash.length - PARAMETER_STORE_BYTES, 0x0807_d000);

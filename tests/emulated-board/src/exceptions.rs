@@ -8,7 +8,11 @@ use unicorn_engine::{RegisterARM as R, Unicorn};
 use crate::cpu::{read_word, write_word};
 use crate::error::BoardError;
 use crate::machine::{Machine, Sleep};
-use crate::scs::NMI_PRIORITY;
+use crate::processor_fault::{FORCED, HARD_FAULT_PRIORITY};
+use crate::scs::{HARD_FAULT, NMI_PRIORITY};
+
+/// CFSR.STKERR: a bus fault while an exception's frame was stored.
+const STACKING_ERROR: u32 = 1 << 12;
 
 const ENTRY_CYCLES: u64 = 12;
 const RETURN_CYCLES: u64 = 10;
@@ -64,7 +68,14 @@ pub(crate) fn enter(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<()
     let (xpsr, old) = (uc.reg_read(R::XPSR)? as u32, uc.reg_read(R::SP)? as u32);
     let aligned_up = old >> 2 & 1;
     let frame = old.wrapping_sub(if fp { FP_FRAME } else { BASIC_FRAME }) & !7;
-    let limit = uc.get_data().image.stack_limit;
+    let nested = !uc.get_data().scs.stack.is_empty();
+    let exc_return = 0xffff_ffe0 | u32::from(!fp) << 4 | if nested { 1 } else { 9 };
+    let image = &uc.get_data().image;
+    let (limit, nothing_below) = (image.stack_limit, image.nothing_below_stack);
+    if frame < limit && nothing_below && uc.get_data().deliver_faults {
+        uc.reg_write(R::CONTROL, control & !FP_ACTIVE)?;
+        return enter_without_frame(uc, (exception, priority), frame, exc_return);
+    }
     if frame < limit {
         let link = uc.reg_read(R::LR)? as u32;
         let what = format!("stack overflow: a frame at {frame:#010x}, static data end at {limit:#010x}");
@@ -87,14 +98,38 @@ pub(crate) fn enter(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<()
         uc.reg_write(R::CONTROL, control & !FP_ACTIVE)?;
     }
     uc.reg_write(R::SP, u64::from(frame))?;
-    let nested = !uc.get_data().scs.stack.is_empty();
-    let exc_return = 0xffff_ffe0 | u32::from(!fp) << 4 | if nested { 1 } else { 9 };
     uc.reg_write(R::LR, u64::from(exc_return))?;
     let machine = uc.get_data_mut();
     let now = machine.moment();
     machine.measure.enter(now);
     machine.cycle += ENTRY_CYCLES;
     go_to_handler(uc, exception, priority)
+}
+
+/// Takes `exception` where its frame lies below the memory of the stack: a bus fault of the stacking (STKERR), which leads to
+/// `HardFault`, unless that is what is entered. The stack pointer has moved all the same, and nothing is stored.
+fn enter_without_frame(
+    uc: &mut Uc<'_>,
+    (exception, priority): (u16, i16),
+    frame: u32,
+    exc_return: u32,
+) -> Result<(), BoardError> {
+    if priority < HARD_FAULT_PRIORITY {
+        let link = uc.reg_read(R::LR)? as u32;
+        uc.get_data_mut().fault(format!("lockup: no stack for exception {exception} at {frame:#010x}"), link);
+        return Ok(());
+    }
+    uc.reg_write(R::SP, u64::from(frame))?;
+    uc.reg_write(R::LR, u64::from(exc_return))?;
+    let machine = uc.get_data_mut();
+    machine.scs.fault_status |= STACKING_ERROR;
+    if exception != HARD_FAULT {
+        machine.scs.hard_fault_status |= FORCED;
+    }
+    let now = machine.moment();
+    machine.measure.enter(now);
+    machine.cycle += ENTRY_CYCLES;
+    go_to_handler(uc, HARD_FAULT, HARD_FAULT_PRIORITY)
 }
 
 fn go_to_handler(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<(), BoardError> {

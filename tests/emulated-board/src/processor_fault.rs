@@ -16,7 +16,7 @@ use crate::scs::{BUS_FAULT, HARD_FAULT, USAGE_FAULT};
 pub(crate) const HARD_FAULT_PRIORITY: i16 = -1;
 
 /// HFSR.FORCED: a fault whose own handler could not be taken.
-const FORCED: u32 = 1 << 30;
+pub(crate) const FORCED: u32 = 1 << 30;
 /// HFSR.DEBUGEVT: BKPT without a debugger.
 const DEBUG_EVENT: u32 = 1 << 31;
 

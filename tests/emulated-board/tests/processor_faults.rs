@@ -3,7 +3,7 @@
 mod common;
 
 use bowden_board::{Board, BoardError};
-use common::{CODE, STACK, elf};
+use common::{CODE, STACK, STATIC_BYTES, elf, elf_beside};
 
 /// Offset of [`HANDLER`] in a program.
 const HANDLER_AT: u32 = 0x20;
@@ -42,7 +42,17 @@ fn program(code: &[u16], second: &[u16]) -> Vec<u16> {
 
 /// What the handler in `vectors` stored when `code` ran with delivery on: PC, LR, CFSR, HFSR, BFAR, IPSR.
 fn found(code: &[u16], second: &[u16], vectors: &[(usize, u32)]) -> Result<[u32; 6], BoardError> {
-    let image = elf(&program(code, second), vectors, &[]);
+    found_beside(STATIC_BYTES, code, second, vectors)
+}
+
+/// The same with `static_bytes` below the stack.
+fn found_beside(
+    static_bytes: u32,
+    code: &[u16],
+    second: &[u16],
+    vectors: &[(usize, u32)],
+) -> Result<[u32; 6], BoardError> {
+    let image = elf_beside(&program(code, second), vectors, &[], static_bytes);
     let mut board = Board::builder(&image).build().expect("a valid ELF");
     board.deliver_faults(true);
     board.run_for(1e-4)?;
@@ -114,6 +124,47 @@ fn a_fault_inside_hard_fault_is_a_lockup_and_ends_the_run() {
     let error = found(&[0x2000, 0xde00], &[0xf04f, 0x45c0, 0x6828], &[(3, SECOND_AT)]);
     let text = error.expect_err("locks up").to_string();
     assert!(text.contains("lockup") && text.contains("0x60000000"), "{text}");
+}
+
+/// mov.w r4, #0x20000000; adds r4, #16; mov sp, r4
+const SMALL_STACK: [u16; 4] = [0xf04f, 0x5400, 0x3410, 0x46a5];
+
+/// Takes the stack from 0x20001000 on and stores the stack pointer that it found, LR, CFSR, HFSR and BFAR at 0x20000200.
+const HANDLER_WITHOUT_STACK: &[u16] = &[
+    0xf3ef, 0x8008, // mrs r0, msp
+    0xf04f, 0x5400, // mov.w r4, #0x20000000
+    0xf504, 0x5180, // add.w r1, r4, #0x1000
+    0x468d, // mov sp, r1
+    0xf8c4, 0x0200, // str.w r0, [r4, #0x200]
+    0xf8c4, 0xe204, // str.w lr, [r4, #0x204]
+    0xf04f, 0x25e0, // mov.w r5, #0xe000e000
+    0xf8d5, 0x1d28, // ldr.w r1, [r5, #0xd28]
+    0xf8c4, 0x1208, // str.w r1, [r4, #0x208]
+    0xf8d5, 0x1d2c, // ldr.w r1, [r5, #0xd2c]
+    0xf8c4, 0x120c, // str.w r1, [r4, #0x20c]
+    0xf8d5, 0x1d38, // ldr.w r1, [r5, #0xd38]
+    0xf8c4, 0x1210, // str.w r1, [r4, #0x210]
+    0xe7fe, // b .
+];
+
+/// By the Armv7-M manual: the push that crosses the end of the memory is a precise bus fault, the frame of the `HardFault` that it leads
+/// to finds no memory either (STKERR), and the handler runs with a stack pointer below the memory.
+#[test]
+fn a_push_below_the_memory_of_the_stack_goes_to_hard_fault_without_a_frame() {
+    // push {r0-r7}; b .
+    let code = [&SMALL_STACK[..], &[0xb4ff, 0xe7fe]].concat();
+    let seen = found_beside(0, &code, HANDLER_WITHOUT_STACK, &[(3, SECOND_AT)]).expect("runs");
+    assert_eq!(seen[..5], [0x1fff_fff0, 0xffff_fff9, 0x9200, FORCED, 0x1fff_fff0]);
+}
+
+/// A bus fault while the frame of another exception is stored leads to `HardFault` in its place.
+#[test]
+fn an_exception_that_finds_no_stack_is_a_hard_fault() {
+    // svc 0; b .
+    let code = [&SMALL_STACK[..], &[0xdf00, 0xe7fe]].concat();
+    let seen =
+        found_beside(0, &code, HANDLER_WITHOUT_STACK, &[(3, SECOND_AT), (11, HANDLER_AT)]).expect("runs");
+    assert_eq!(seen[..4], [0x1fff_fff0, 0xffff_fff9, 0x1000, FORCED]);
 }
 
 #[test]

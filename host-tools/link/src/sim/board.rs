@@ -263,6 +263,7 @@ impl SimBoard {
             Provocation::ProcessorFault => Fault::HardFault,
             Provocation::Hang => Fault::Watchdog,
             Provocation::LateTick => Fault::TickOverrun,
+            Provocation::StackOverflow => Fault::StackOverflow,
         };
         self.queues.commands.push_back((Order::Stop, Command::Trip(fault, 0, 1.0, 0.0)));
     }

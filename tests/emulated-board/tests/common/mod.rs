@@ -13,6 +13,16 @@ pub const STATIC_BYTES: u32 = 0x400;
 /// An ELF with `code` at [`CODE`], vectors as (exception number, offset into the code) and functions as (name, offset,
 /// bytes). The reset vector points at offset 0.
 pub fn elf(code: &[u16], vectors: &[(usize, u32)], functions: &[(&str, u32, u32)]) -> Vec<u8> {
+    elf_beside(code, vectors, functions, STATIC_BYTES)
+}
+
+/// The same with `static_bytes` of static data from the beginning of RAM; with none, nothing is below the stack.
+pub fn elf_beside(
+    code: &[u16],
+    vectors: &[(usize, u32)],
+    functions: &[(&str, u32, u32)],
+    static_bytes: u32,
+) -> Vec<u8> {
     let mut flash = vec![0_u8; 0x200];
     let mut vector = |number: usize, value: u32| {
         flash[4 * number..4 * number + 4].copy_from_slice(&value.to_le_bytes());
@@ -63,6 +73,6 @@ pub fn elf(code: &[u16], vectors: &[(usize, u32)], functions: &[(&str, u32, u32)
     words(&mut file, &[7, 2, 0, 0, symbols_at as u32, symbols.len() as u32, 3, 1, 4, 16]);
     words(&mut file, &[15, 3, 0, 0, strings_at as u32, strings.len() as u32, 0, 0, 1, 0]);
     words(&mut file, &[23, 3, 0, 0, names_at as u32, names.len() as u32, 0, 0, 1, 0]);
-    words(&mut file, &[33, 8, 3, 0x2000_0000, names_at as u32, STATIC_BYTES, 0, 0, 4, 0]);
+    words(&mut file, &[33, 8, 3, 0x2000_0000, names_at as u32, static_bytes, 0, 0, 4, 0]);
     file
 }

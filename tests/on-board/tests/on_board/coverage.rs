@@ -40,6 +40,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::FlashDamaged => "damaged_code_opens_the_bridge_and_is_a_named_fault",
         Fault::FlashBanks => "a_flash_of_one_bank_is_told_and_nothing_is_stored",
         Fault::RestartLoop => "three_restarts_without_a_host_end_in_safe_mode",
+        Fault::StackOverflow => "a_stack_that_runs_over_its_end_stops_the_motor_and_is_a_named_fault",
         Fault::SelfTestTimeout => "a_restless_sensor_ends_the_self_test",
         Fault::PretensionOff => "lost_pretension_is_found_before_the_bridge_is_on",
         Fault::HomingTimeout => "homing_that_does_not_arrive_ends",

@@ -1,4 +1,4 @@
-//! Failures of the firmware itself, provoked by the host: panic, processor fault, hang, late tick.
+//! Failures of the firmware itself, provoked by the host: panic, processor fault, stack overflow, hang, late tick.
 
 use bowden_board::{Board, ResetCause};
 use bowden_link::message::{Boot, Goal, Provocation, Refusal};
@@ -20,9 +20,13 @@ fn provocable() -> Outcome<Host> {
 #[test]
 fn nobody_provokes_a_board_by_mistake() -> Outcome {
     let mut host = switched_on(1)?;
-    for provocation in
-        [Provocation::Panic, Provocation::ProcessorFault, Provocation::Hang, Provocation::LateTick]
-    {
+    for provocation in [
+        Provocation::Panic,
+        Provocation::ProcessorFault,
+        Provocation::Hang,
+        Provocation::LateTick,
+        Provocation::StackOverflow,
+    ] {
         let answer = host.ask(&ToBoard::Provoke(provocation))?;
         let index = Host::index("supervisor.allow_provoke")?;
         assert_eq!(answer, FromBoard::Refused(Refusal::Forbidden(index)));
@@ -93,6 +97,14 @@ fn a_processor_fault_stops_the_motor_and_says_where() -> Outcome {
     let text = end_of_run(Provocation::ProcessorFault, Boot::Software, Fault::HardFault)?;
     // UNDEFINSTR of CFSR.
     assert!(text.contains("0x08") && text.contains("0x00010000"), "{text}");
+    Ok(())
+}
+
+/// The stack ends where the RAM begins: nothing is overwritten, so that the last ticks and the words are there.
+#[test]
+fn a_stack_that_runs_over_its_end_stops_the_motor_and_is_a_named_fault() -> Outcome {
+    let text = end_of_run(Provocation::StackOverflow, Boot::Software, Fault::StackOverflow)?;
+    assert!(text.contains("stack pointer 0x"), "{text}");
     Ok(())
 }
 
