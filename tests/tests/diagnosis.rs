@@ -1,7 +1,7 @@
 //! Whole diagnoses of the virtual bench: what is named, where, when, and what the written rig file predicts of a second
 //! recording.
 //!
-//! The benches are a few per cent off their rig files, as real ones are. Each diagnosis tries the whole catalogue on 24 s.
+//! The benches are a few per cent off their rig files, as real ones are. Each diagnosis tries the whole catalogue on 16 s.
 
 use std::time::Instant;
 
@@ -26,7 +26,7 @@ use virtual_bench::{
 };
 
 /// Length of the diagnosed recordings, s.
-const SECONDS: f64 = 24.0;
+const SECONDS: f64 = 16.0;
 
 /// Length of the second recordings, s.
 const SECOND_SECONDS: f64 = 12.0;
