@@ -308,6 +308,11 @@ impl Board {
         self.bus_mut().host.set_plugged(plugged);
     }
 
+    /// Lets the bus rest, as a computer that sleeps does, or resumes. The port stays open, and the device configured.
+    pub fn set_usb_suspended(&mut self, suspended: bool) {
+        self.bus_mut().host.suspended = suspended;
+    }
+
     // ---- what the board does ----------------------------------------------------------------------------------
 
     /// Log lines so far.

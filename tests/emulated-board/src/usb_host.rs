@@ -2,7 +2,7 @@
 //! port.
 //!
 //! Each poll makes one control transaction, or one OUT and one IN transaction of the bulk pair. Data toggles are
-//! checked. Not modelled: start of frame, suspend, the notification endpoint, high speed.
+//! checked. Not modelled: start of frame, remote wake-up, the notification endpoint, high speed.
 
 use std::collections::VecDeque;
 
@@ -14,6 +14,10 @@ const DEBOUNCE_S: f64 = 2.0e-3;
 const RESET_S: f64 = 1.0e-3;
 /// Rest behind `SET_ADDRESS` \[s\].
 const ADDRESS_S: f64 = 2.0e-3;
+/// Rest of the bus behind which a device suspends \[s\].
+const IDLE_S: f64 = 3.0e-3;
+/// Length of the resume signal \[s\].
+const RESUME_S: f64 = 20.0e-3;
 /// Longest time for a control transfer \[s\].
 const CONTROL_LIMIT_S: f64 = 5.0;
 /// Address given to the device.
@@ -111,6 +115,10 @@ enum State {
 pub(crate) struct UsbHost {
     state: State,
     plugged: bool,
+    /// Lets the bus rest.
+    pub suspended: bool,
+    idle_since_s: Option<f64>,
+    resuming_until_s: f64,
     /// Neither writes nor reads.
     pub silent: bool,
     /// Asks the device for packets.
@@ -153,6 +161,9 @@ impl UsbHost {
         Self {
             state: State::Detached,
             plugged: true,
+            suspended: false,
+            idle_since_s: None,
+            resuming_until_s: 0.0,
             silent: false,
             reading: true,
             withheld: false,
@@ -215,6 +226,10 @@ impl UsbHost {
     pub(crate) fn poll(&mut self, device: &mut Usb, now_s: f64) -> Result<Moved, String> {
         self.next_s = now_s + self.poll_s;
         let mut moved = Moved::default();
+        let rests = self.suspended || !self.plugged;
+        if rests && now_s - *self.idle_since_s.get_or_insert(now_s) >= IDLE_S {
+            device.bus_idle();
+        }
         if !(self.plugged && device.attached()) {
             if self.state != State::Detached {
                 self.detach();
@@ -223,7 +238,16 @@ impl UsbHost {
             self.next_s = now_s + 1e-3;
             return Ok(moved);
         }
-        if self.silent {
+        if self.suspended {
+            return Ok(moved);
+        }
+        // One that was plugged in again is woken by the reset.
+        let rested_s = self.idle_since_s.take().map_or(0.0, |since_s| now_s - since_s);
+        if rested_s >= IDLE_S && self.state != State::Detached {
+            device.bus_resumes();
+            self.resuming_until_s = now_s + RESUME_S;
+        }
+        if self.silent || now_s < self.resuming_until_s {
             return Ok(moved);
         }
         match self.state {

@@ -1,7 +1,7 @@
 //! USB full-speed device: endpoint registers, packet memory, control and single-buffered bulk transfers (RM0440, USB).
 //!
-//! The host's side is the methods `bus_reset`, `host_setup`, `host_out` and `host_in`. Not modelled: suspend and resume,
-//! start of frame, double-buffered and isochronous endpoints, battery charging detection.
+//! The host's side is the methods `bus_reset`, `bus_idle`, `bus_resumes`, `host_setup`, `host_out` and `host_in`. Not modelled:
+//! remote wake-up, start of frame, double-buffered and isochronous endpoints, battery charging detection.
 
 use crate::error::{Refusal, only};
 
@@ -16,6 +16,14 @@ const CTR_TX: u16 = 1 << 7;
 const DTOG_TX: u16 = 1 << 6;
 const STAT_TX: u16 = 3 << 4;
 const RESET: u16 = 1 << 10;
+/// ISTR: nothing was on the bus for 3 ms.
+const SUSPEND: u16 = 1 << 11;
+/// ISTR: the bus of a suspended device is used again.
+const WAKE_UP: u16 = 1 << 12;
+/// CNTR: the device is suspended.
+const FORCE_SUSPEND: u16 = 1 << 3;
+/// CNTR: its transceiver sleeps, until the bus is used again.
+const LOW_POWER: u16 = 1 << 2;
 const STALL: u16 = 1;
 const NAK: u16 = 2;
 const VALID: u16 = 3;
@@ -169,14 +177,38 @@ impl Usb {
 
     /// Register that answers at endpoint number `endpoint`.
     fn register_of(&self, endpoint: u8, status: u16) -> Option<usize> {
+        if self.suspended() {
+            return None;
+        }
         self.endpoints.iter().position(|value| (value & 0xf) as u8 == endpoint && value & status != 0)
     }
 
     /// The host signals a bus reset.
     pub(crate) fn bus_reset(&mut self) {
+        self.bus_resumes();
         self.istr |= RESET;
         self.endpoints = [0; ENDPOINTS];
         self.daddr = 0;
+    }
+
+    /// Nothing is on the bus, for 3 ms or more. A suspended device is not told again.
+    pub(crate) fn bus_idle(&mut self) {
+        if self.attached() && !self.suspended() {
+            self.istr |= SUSPEND;
+        }
+    }
+
+    /// The bus is used again, as by the host's resume signal.
+    pub(crate) fn bus_resumes(&mut self) {
+        if self.suspended() {
+            self.cntr &= !LOW_POWER;
+            self.istr |= WAKE_UP;
+        }
+    }
+
+    /// Whether the firmware has suspended the device, which then answers nothing.
+    fn suspended(&self) -> bool {
+        self.cntr & FORCE_SUSPEND != 0
     }
 
     /// Puts `data` into the reception buffer of register `index`.
@@ -306,6 +338,26 @@ mod tests {
         let first = InPacket { data: b"abc".to_vec(), toggle: false };
         assert_eq!(usb.host_in(1), Ok(Handshake::Ack(first)));
         assert_eq!(usb.host_in(1), Ok(Handshake::Nak));
+    }
+
+    /// RM0440, USB suspend and resume: SUSP until the firmware clears it, none while FSUSP is set, then WKUP, which ends LPMODE.
+    #[test]
+    fn a_bus_at_rest_suspends_and_a_used_one_wakes() {
+        let mut usb = configured();
+        usb.bus_resumes();
+        assert_eq!(usb.read(0x44), Ok(0), "it was awake");
+        usb.write(0x40, 0x9c00).expect("CNTR with SUSPM and WKUPM");
+        usb.bus_idle();
+        assert_eq!((usb.read(0x44), usb.line()), (Ok(0x0800), true));
+        usb.write(0x40, 0x9c0c).expect("FSUSP, LPMODE");
+        usb.write(0x44, 0xf7ff).expect("ISTR");
+        usb.bus_idle();
+        assert_eq!((usb.read(0x44), usb.line()), (Ok(0), false));
+        assert_eq!(usb.host_out(1, b"x", false), Ok(Handshake::Silent));
+        usb.bus_resumes();
+        assert_eq!((usb.read(0x44), usb.read(0x40), usb.line()), (Ok(0x1000), Ok(0x9c08), true));
+        usb.write(0x40, 0x9c00).expect("FSUSP ended");
+        assert_eq!(usb.host_out(1, b"x", false), Ok(Handshake::Ack(())));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A host that does not read, is unplugged, or sends rubbish: the tick goes on, losses are counted, the link comes back.
+//! A host that does not read, sleeps, is unplugged, or sends rubbish: the tick goes on, losses are counted, the link comes back.
 
 use bowden_board::Injection;
 use bowden_link::{State, ToBoard};
@@ -64,6 +64,32 @@ fn a_plug_that_is_pulled_stops_the_joint_and_the_link_comes_back() -> Outcome {
     host.board.set_usb_plugged(true);
     host.run(0.02)?;
     host.reconnect()?;
+    let fault = host.status()?.fault.map(|record| record.fault);
+    assert_eq!(fault, Some(bowden_link::Fault::HostSilent));
+    Ok(())
+}
+
+/// A computer that sleeps suspends the bus: the device stays configured and the port open, so that all goes on where it was.
+#[test]
+fn a_host_that_sleeps_is_a_silent_one_and_all_goes_on_when_it_wakes() -> Outcome {
+    let mut host = streaming()?;
+    host.board.set_usb_suspended(true);
+    host.run(0.3)?;
+    // Not yet half a second.
+    assert!(host.board.pwm().duty.is_some());
+    host.board.set_usb_suspended(false);
+    let received = host.telemetry.received;
+    host.run(0.2)?;
+    // What the queue holds of the 0.3 s, the 20 ms of the resume signal, and 180 ms.
+    assert!(host.telemetry.received - received >= 1800, "{}", host.telemetry.received - received);
+    assert_eq!(host.telemetry.missing, u64::from(host.telemetry.lost));
+    assert_eq!((host.bad_frames, host.status()?.state), (0, State::Run));
+    assert!(host.ticks.period.spread() <= JITTER, "{:?}", host.ticks.period);
+    host.board.set_usb_suspended(true);
+    host.run(0.7)?;
+    assert_eq!(host.board.pwm().duty, None, "nobody is there");
+    host.board.set_usb_suspended(false);
+    host.run(0.03)?;
     let fault = host.status()?.fault.map(|record| record.fault);
     assert_eq!(fault, Some(bowden_link::Fault::HostSilent));
     Ok(())
