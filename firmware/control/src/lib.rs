@@ -6,6 +6,7 @@
 //! | [`controller`] | one control tick: [`tick::TickInput`] in, [`tick::TickOutput`] out |
 //! | [`scale`] | fixed-point quantities and gains |
 //! | [`encoder`], [`tension`], [`supply`] | sensors, and whether they can be believed |
+//! | [`winding`] | how hot the motor is |
 //! | [`mod@reference`] | where the joint is to be |
 //! | [`compensator`] | where the input pulley has to be for that |
 //! | [`sheath`] | how much friction the sheaths have at the moment |
@@ -42,6 +43,7 @@ pub mod supervisor;
 pub mod supply;
 pub mod tension;
 pub mod tick;
+pub mod winding;
 
 pub use parameters::{reference_config, tick_config};
 

@@ -5,6 +5,7 @@ use bowden_link::Fault;
 use crate::detection::Detection;
 use crate::scale::{Code, Current, Debounce, Gain, Quantity, Sum, Voltage, Weight};
 use crate::tension::code;
+use crate::winding::{Winding, WindingConfig};
 
 /// Channels and what is expected of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +26,8 @@ pub struct SupplyConfig {
     pub bus_range: [Voltage; 2],
     /// Ticks for which it has to be wrong, at least 1.
     pub bus_ticks: u16,
+    /// What the motor's winding bears.
+    pub winding: WindingConfig,
 }
 
 /// State of the channels.
@@ -34,6 +37,7 @@ pub struct Supply {
     under_voltage: Debounce,
     over_voltage: Debounce,
     bus: Option<Sum<Voltage>>,
+    winding: Winding,
 }
 
 /// Current and voltage of a tick.
@@ -56,7 +60,8 @@ impl Supply {
         let bus = config.bus_gain.apply(code(bus_raw));
         let bus_filtered = self.bus.get_or_insert_with(|| Sum::at(bus)).approach(config.bus_filter, bus);
         let [low, high] = config.bus_range;
-        let fine = current.is_at_most(config.over_current) && bus.is_within(low, high);
+        let bearable = self.winding.warm(&config.winding, current);
+        let fine = current.is_at_most(config.over_current) && bus.is_within(low, high) && bearable;
         let found = if fine {
             // Nearly always.
             (self.over_current, self.under_voltage, self.over_voltage) = Default::default();
@@ -83,7 +88,7 @@ impl Supply {
         } else if over {
             Some(Detection::new(Fault::BusOverVoltage, 0, bus.to_f32(), high.to_f32()))
         } else {
-            None
+            self.winding.too_hot(&config.winding)
         }
     }
 }

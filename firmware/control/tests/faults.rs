@@ -94,6 +94,18 @@ fn every_fault_stops_the_motor_in_its_tick() {
     }
 }
 
+/// 6 A where 2 A are borne, at a time constant of 0.2 s, last `0.2 ln(36/32)`: 23.6 ms from cold, a little less behind a motion.
+#[test]
+fn a_hot_winding_stops_the_motor() {
+    let mut parameters = Parameters::default();
+    (parameters.motor.continuous_current, parameters.motor.winding_time) = (2.0, 0.2);
+    let mut bench = running(parameters);
+    bench.disturbance = Some(|input| input.current_raw = 2941);
+    let (ticks, record) = trip(&mut bench, 300);
+    assert_eq!((record.fault, record.channel, record.limit), (Fault::WindingHot, 0, 2.0), "{record}");
+    assert!((180..=237).contains(&ticks) && (record.got - 2.0).abs() < 0.02, "{ticks} ticks, {record}");
+}
+
 #[test]
 fn faults_count_in_the_states_of_the_table() {
     for case in cases() {

@@ -37,6 +37,10 @@ pub struct Motor {
     pub rotor_inertia: f32,
     /// Viscous friction at the input pulley, N·m·s/rad.
     pub viscous: f32,
+    /// Current that the winding bears for ever, A.
+    pub continuous_current: f32,
+    /// Thermal time constant of the winding, s.
+    pub winding_time: f32,
 }
 
 /// Both encoders.

@@ -156,4 +156,6 @@ parameter_table! {
     correction.ripple_table.enable, "", 0.0, 1.0, 0.0, true;
     correction.ripple_table.limit, "N·m", 0.0, 20.0, 0.5, true;
     bridge.wake_time, "s", 0.0, 1.0, 0.02, true;
+    motor.continuous_current, "A", 0.05, 13.0, 4.0, true;
+    motor.winding_time, "s", 0.1, 3600.0, 30.0, true;
 }

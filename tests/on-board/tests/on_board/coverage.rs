@@ -26,6 +26,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::TensionInconsistent => "tensions_that_do_not_fit_the_friction_are_found",
         Fault::StretchInconsistent => "tensions_that_contradict_the_stretch_are_found",
         Fault::OverCurrent => "over_current_stops_in_three_ticks",
+        Fault::WindingHot => "a_hot_winding_stops",
         Fault::BusUnderVoltage | Fault::BusOverVoltage => "a_bus_voltage_out_of_range_stops",
         Fault::BridgeFault => "a_fault_of_the_bridge_stops_at_once",
         Fault::TickOverrun => "a_late_tick_is_a_fault",

@@ -138,6 +138,18 @@ fn over_current_stops_in_three_ticks() -> Outcome {
     Ok(())
 }
 
+/// By the closed form 0.1 s · ln(5² / (5² - 1.5²)) = 9.4 ms at 5 A from cold; the joint's own current shifts it.
+#[test]
+fn a_hot_winding_stops() -> Outcome {
+    let mut host = moving()?;
+    host.set("motor.winding_time", 0.1)?;
+    host.set("motor.continuous_current", 1.5)?;
+    let (record, opening) = stop_by(&mut host, Injection::CurrentOffset(5.0), 0.03)?;
+    assert_eq!((record.fault, record.channel, record.limit), (Fault::WindingHot, 0, 1.5), "{record}");
+    assert!((5e-3..15e-3).contains(&opening.after_s), "{record}: {opening:?}");
+    Ok(())
+}
+
 #[test]
 fn a_bus_voltage_out_of_range_stops() -> Outcome {
     // 5 ms of debounce.

@@ -10,6 +10,7 @@ use crate::parameters::Parameters;
 use crate::scale::{Code, Current, Quantity, Tension, Voltage, Weight};
 use crate::supply::SupplyConfig;
 use crate::tension::{TensionConfig, V_PER_CODE};
+use crate::winding::WindingConfig;
 
 pub(super) fn encoder(parameters: &Parameters, joint: bool) -> Result<EncoderConfig, Refusal> {
     let encoders = &parameters.encoder;
@@ -72,7 +73,7 @@ pub(super) fn tension(parameters: &Parameters, period_s: f32) -> Result<TensionC
 pub(super) fn supply(parameters: &Parameters, period_s: f32) -> Result<SupplyConfig, Refusal> {
     /// Time constant of the bus voltage that the drive divides by, s: slower than its noise, faster than a supply.
     const BUS_FILTER_S: f32 = 2e-3;
-    let (bridge, supervisor) = (&parameters.bridge, &parameters.supervisor);
+    let (bridge, motor, supervisor) = (&parameters.bridge, &parameters.motor, &parameters.supervisor);
     Ok(SupplyConfig {
         current_zero: Code::from_f32(bridge.current_zero),
         current_gain: gain(bridge.current_gain * bridge.direction, "bridge.current_gain")?,
@@ -82,6 +83,11 @@ pub(super) fn supply(parameters: &Parameters, period_s: f32) -> Result<SupplyCon
         over_current_ticks: ticks(supervisor.over_current_time, period_s),
         bus_range: [supervisor.bus_minimum, supervisor.bus_maximum].map(Voltage::from_f32),
         bus_ticks: ticks(supervisor.bus_debounce, period_s),
+        winding: WindingConfig {
+            continuous: Current::from_f32(motor.continuous_current),
+            of_continuous: gain(1.0 / motor.continuous_current, "motor.continuous_current")?,
+            warming: Weight::low_pass(motor.winding_time, period_s),
+        },
     })
 }
 
