@@ -13,20 +13,21 @@ import pytest
 import bowden
 
 
-def test_python_and_shell_get_the_same_diagnosis(servo, bowden_command, tmp_path):
-    subprocess.run([bowden_command, "diagnose", servo, "--out", tmp_path / "shell", "--quiet"], check=True, stdout=subprocess.DEVNULL)
-    d = bowden.diagnose(servo, progress=False)
+def test_python_and_shell_get_the_same_diagnosis(play, play_diagnosis, bowden_command, tmp_path):
+    files = [play / "train.csv", "--rig", play / "rig.toml", "--heldout", play / "heldout.csv"]
+    subprocess.run([bowden_command, "diagnose", *files, "--out", tmp_path / "shell", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    d = play_diagnosis
     assert d.save(tmp_path / "python") == tmp_path / "python/report.html"
-    files = sorted(path.name for path in (tmp_path / "shell").iterdir())
-    assert files == sorted(path.name for path in (tmp_path / "python").iterdir())
-    for name in files:
+    written = sorted(path.name for path in (tmp_path / "shell").iterdir())
+    assert written == sorted(path.name for path in (tmp_path / "python").iterdir())
+    for name in written:
         assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
-    assert (d.verdict, d.effects[0].id, d.complete) == ("missing_physics", "gear_load_friction", True)
+    assert (d.verdict, d.effects[0].id, d.complete) == ("missing_physics", "joint_backlash", True)
     said = json.loads((tmp_path / "shell/diagnosis.json").read_text())
     assert d.to_dict() == said
-    assert d.effects[0].parameters["coefficient"].value == said["effects"][0]["parameters"]["coefficient"]["value"]
-    assert d.channels["theta_out_rad"].after_rmse < 0.3 * d.channels["theta_out_rad"].before_rmse
-    assert d.rig["effects.gear_load_friction.coefficient"] == d.effects[0].parameters["coefficient"].value
+    assert d.effects[0].parameters["gap_rad"].value == said["effects"][0]["parameters"]["gap_rad"]["value"]
+    assert d.channels["theta_out_rad"].after_rmse < 0.5 * d.channels["theta_out_rad"].before_rmse
+    assert d.rig["effects.joint_backlash.gap_rad"] == d.effects[0].parameters["gap_rad"].value
     assert d.report(tmp_path / "again.html").read_bytes() == (tmp_path / "shell/report.html").read_bytes()
 
 
