@@ -46,8 +46,6 @@ pub(crate) struct Image {
     pub sizes: ImageSizes,
     /// Lowest address that the stack may grow down to: end of the static data under the initial stack pointer.
     pub stack_limit: u32,
-    /// Whether the stack ends where its memory begins, so that a word more is a bus fault.
-    pub nothing_below_stack: bool,
     /// Initial stack pointer.
     pub stack_top: u32,
 }
@@ -126,19 +124,12 @@ impl Image {
             .find(|symbol| symbol.name() == Ok("_SEGGER_RTT"))
             .map(|symbol| symbol.address() as u32);
         let sizes = ImageSizes { flash_bytes, ram_bytes, ram_code_bytes };
-        let nothing_below_stack = stack_limit == stack_memory.start;
-        Ok(Self {
-            flash,
-            code,
-            functions,
-            statics,
-            rtt,
-            uses_ccm,
-            sizes,
-            stack_limit,
-            nothing_below_stack,
-            stack_top,
-        })
+        Ok(Self { flash, code, functions, statics, rtt, uses_ccm, sizes, stack_limit, stack_top })
+    }
+
+    /// Whether the stack ends where a memory begins, so that a word more is a bus fault.
+    pub(crate) fn nothing_below_stack(&self) -> bool {
+        [RAM, CCM].iter().any(|region| region.start == self.stack_limit)
     }
 
     /// Name of the function that holds `address`.

@@ -71,7 +71,7 @@ pub(crate) fn enter(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<()
     let nested = !uc.get_data().scs.stack.is_empty();
     let exc_return = 0xffff_ffe0 | u32::from(!fp) << 4 | if nested { 1 } else { 9 };
     let image = &uc.get_data().image;
-    let (limit, nothing_below) = (image.stack_limit, image.nothing_below_stack);
+    let (limit, nothing_below) = (image.stack_limit, image.nothing_below_stack());
     if frame < limit && nothing_below && uc.get_data().deliver_faults {
         uc.reg_write(R::CONTROL, control & !FP_ACTIVE)?;
         return enter_without_frame(uc, (exception, priority), frame, exc_return);

@@ -118,7 +118,6 @@ pub(crate) struct UsbHost {
     /// Lets the bus rest.
     pub suspended: bool,
     idle_since_s: Option<f64>,
-    resuming_until_s: f64,
     /// Neither writes nor reads.
     pub silent: bool,
     /// Asks the device for packets.
@@ -163,7 +162,6 @@ impl UsbHost {
             plugged: true,
             suspended: false,
             idle_since_s: None,
-            resuming_until_s: 0.0,
             silent: false,
             reading: true,
             withheld: false,
@@ -245,9 +243,9 @@ impl UsbHost {
         let rested_s = self.idle_since_s.take().map_or(0.0, |since_s| now_s - since_s);
         if rested_s >= IDLE_S && self.state != State::Detached {
             device.bus_resumes();
-            self.resuming_until_s = now_s + RESUME_S;
+            self.rest_until_s = now_s + RESUME_S;
         }
-        if self.silent || now_s < self.resuming_until_s {
+        if self.silent || now_s < self.rest_until_s {
             return Ok(moved);
         }
         match self.state {
@@ -415,9 +413,6 @@ impl UsbHost {
     }
 
     fn enumerate(&mut self, step: Step, device: &mut Usb, now_s: f64) -> Result<(), String> {
-        if now_s < self.rest_until_s {
-            return Ok(());
-        }
         if self.control.is_none() && !self.request_for(step, now_s) {
             self.advance(step);
             return Ok(());
