@@ -6,6 +6,7 @@
 //! | form | y |
 //! |---|---|
 //! | power | `a sign(x) abs(x)^p` |
+//! | power by direction | `a (1 + s sign(x)) abs(x)^p` |
 //! | wave | `a sin(n x + phase)`; over time `a sin(2 pi f t + phase)` |
 //! | bump | `a exp(-((x - at) / width)^2)` |
 //! | ramp | `a x` |

@@ -27,6 +27,13 @@ const SENSORS: &[Channel] = &[
 const ANGLES: &[Channel] = &[Channel::ThetaIn, Channel::ThetaOut];
 
 const EXPONENT: ParameterSpec = ParameterSpec::linear("exponent", "1", [0.2, 5.0], 2.0, "exponent");
+const ASYMMETRY: ParameterSpec = ParameterSpec::linear(
+    "asymmetry",
+    "1",
+    [-1.0, 1.0],
+    0.5,
+    "part by which more acts in positive direction",
+);
 const ANY_EXPONENT: ParameterSpec = ParameterSpec::linear("exponent", "1", [-3.0, 5.0], 1.0, "exponent");
 const CYCLES: ParameterSpec =
     ParameterSpec::log("cycles_per_turn", "1", [0.3, 300.0], 4.0, "periods per turn");
@@ -96,7 +103,7 @@ macro_rules! law {
 }
 
 /// All laws, input to output.
-pub static LAWS: [Law; 30] = [
+pub static LAWS: [Law; 32] = [
     law!(
         "law_motor_friction_by_speed",
         MotorFriction,
@@ -104,6 +111,14 @@ pub static LAWS: [Law; 30] = [
         EvenPower,
         "amplitude_nm * abs(omega_in_rad_s)^exponent",
         [DRAG, EXPONENT]
+    ),
+    law!(
+        "law_motor_friction_by_direction",
+        MotorFriction,
+        InputSpeed,
+        DirectedPower,
+        "amplitude_nm * (1 + asymmetry * sign(omega_in_rad_s)) * abs(omega_in_rad_s)^exponent",
+        [DRAG, EXPONENT, ASYMMETRY]
     ),
     law!(
         "law_motor_friction_at_a_place",
@@ -248,6 +263,14 @@ pub static LAWS: [Law; 30] = [
         EvenPower,
         "amplitude_nm * abs(omega_out_rad_s)^exponent",
         [DRAG, EXPONENT]
+    ),
+    law!(
+        "law_joint_friction_by_direction",
+        JointFriction,
+        JointSpeed,
+        DirectedPower,
+        "amplitude_nm * (1 + asymmetry * sign(omega_out_rad_s)) * abs(omega_out_rad_s)^exponent",
+        [DRAG, EXPONENT, ASYMMETRY]
     ),
     law!(
         "law_joint_friction_at_a_place",

@@ -8,7 +8,7 @@ use bowden_model::parameters::MotorParameters;
 
 use super::candidates::{Candidate, fits, targets};
 use super::unexplained::samples::{Samples, Variable as Seen};
-use super::unexplained::structure::{frequencies_hz, rates_along};
+use super::unexplained::structure::{frequencies_hz, rates_along, slow_frequency_hz};
 use crate::fit::objective::{Objective, Series};
 use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
@@ -16,6 +16,9 @@ use crate::simulation::Prediction;
 
 /// Exponents at which a power of speed or angle is tried.
 const EXPONENTS: [f64; 3] = [0.5, 2.0, 3.0];
+
+/// Exponents and asymmetries at which a friction that differs with the direction is tried.
+const BY_DIRECTION: [[f64; 2]; 4] = [[0.3, 0.5], [0.3, -0.5], [1.0, 0.5], [1.0, -0.5]];
 
 /// Exponents at which a change with the tension is tried.
 const EXPONENTS_FROM_ONE: [f64; 3] = [-0.7, 0.7, 2.0];
@@ -63,7 +66,7 @@ pub(super) fn law_candidates(
         motor: model.parameters.motor,
         input_rates: rates_along(&samples, Seen::ThetaIn),
         joint_rates: rates_along(&samples, Seen::ThetaOut),
-        frequencies_hz: frequencies_hz(&samples, None),
+        frequencies_hz: swings_hz(&samples, None),
         samples,
     };
     let mut found = Vec::new();
@@ -113,6 +116,16 @@ impl Ground<'_> {
                 let exponents = least.into_iter().chain(&EXPONENTS);
                 if usual > 0.0 { exponents.map(start).collect() } else { Vec::new() }
             }
+            Form::DirectedPower => {
+                let usual = self.usual(law.variable());
+                let size = base.parameters[0];
+                let start = |[exponent, asymmetry]: [f64; 2]| {
+                    base.with("exponent", exponent)
+                        .with("asymmetry", asymmetry)
+                        .with("amplitude_nm", size / usual.powf(exponent))
+                };
+                if usual > 0.0 { BY_DIRECTION.map(start).to_vec() } else { Vec::new() }
+            }
             Form::Wave => {
                 let rates = match law.variable() {
                     Variable::InputAngle => &self.input_rates,
@@ -123,7 +136,7 @@ impl Ground<'_> {
             }
             Form::Oscillation => {
                 let own = match base.target {
-                    Target::One(channel) => frequencies_hz(&self.samples, Some(Series::Channel(channel))),
+                    Target::One(channel) => swings_hz(&self.samples, Some(Series::Channel(channel))),
                     _ => self.frequencies_hz.clone(),
                 };
                 waves(base, "frequency_hz", &own)
@@ -214,6 +227,11 @@ fn range<'a>(values: impl Iterator<Item = &'a f64>) -> Option<(f64, f64)> {
         let (low, high) = ends.unwrap_or((*x, *x));
         Some((low.min(*x), high.max(*x)))
     })
+}
+
+/// Frequencies at which something may swing, Hz: fast ones, and the clearest slow one.
+fn swings_hz(samples: &Samples, of: Option<Series>) -> Vec<f64> {
+    frequencies_hz(samples, of).into_iter().chain(slow_frequency_hz(samples, of)).collect()
 }
 
 /// At every rate, both phases.

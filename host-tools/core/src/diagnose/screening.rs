@@ -35,6 +35,10 @@ const STRONGEST: f64 = 3.0;
 /// Times that a start is made that much stronger.
 const STRENGTHENED: usize = 8;
 
+/// Parts of the strength that an estimate asks for, of which the one that predicts best is taken: a loss that does not grow with the
+/// square of large differences makes what changes them look weak.
+const PARTS_OF_ASKED: [f64; 2] = [1.0, 0.5];
+
 /// Share of what an effect changes that parameters change as well, from which on it is tried where they make room for it.
 const IN_PLACE_OF: f64 = 0.5;
 
@@ -200,13 +204,19 @@ impl Background<'_> {
         let neutral = best.start.descriptor().neutral.unwrap_or(0.0);
         let strength = |start: &Screened| (start.start.parameters[0] - neutral).abs();
         for _ in 0..STRENGTHENED {
-            let Some(there) = linear.and_then(|linear| self.judge(linear.start)) else { break };
-            if there.start.gain <= best.gain {
-                break;
-            }
-            let asked = strength(&there.start) / strength(&best);
+            let Some(asked) = linear else { break };
+            let weaker = |part: f64| {
+                let strength = neutral + part * (asked.start.parameters[0] - neutral);
+                let mut start = asked.start;
+                start.parameters[0] = strength;
+                self.judge(start)
+            };
+            let tried = PARTS_OF_ASKED.into_iter().filter_map(weaker);
+            let best_part = tried.max_by(|a, b| a.start.gain.total_cmp(&b.start.gain));
+            let Some(there) = best_part.filter(|there| there.start.gain > best.gain) else { break };
+            let grown = strength(&there.start) / strength(&best);
             best = there.start;
-            if asked < 0.99 * STRONGEST {
+            if grown < 0.99 * STRONGEST {
                 break;
             }
             linear = there.linear;
@@ -362,6 +372,19 @@ mod tests {
         let (found, _) = screened(&model, recording, &[], vec![start]);
         assert!((found.start.parameters[0] / strong - 1.0).abs() < 0.3, "{:?}", found.start.parameters[0]);
         assert!(found.gain > 0.8, "{}", found.gain);
+    }
+
+    /// Tensions that swing by many times their scale, tried with the wrong sign: the estimate asks for twice what is right.
+    #[test]
+    fn what_is_asked_for_too_strongly_is_tried_at_a_part_of_it() {
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let law = bowden_model::law::find("law_tendon_length_over_time").unwrap();
+        let start = ActiveEffect::with_defaults(law).with("amplitude", 0.1).with("frequency_hz", 0.5);
+        record(&model, start.with("amplitude", -0.15), &mut recording);
+        let (found, _) = screened(&model, recording, &[], vec![start]);
+        assert!((found.start.parameters[0] / -0.15 - 1.0).abs() < 0.4, "{:?}", found.start.parameters[0]);
+        assert!(found.gain > 0.5, "{}", found.gain);
     }
 
     /// An effect that does nothing at one and not at zero is made stronger too, from one tenth more to nine tenths.

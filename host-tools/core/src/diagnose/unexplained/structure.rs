@@ -157,6 +157,18 @@ pub(crate) fn frequencies_hz(samples: &Samples, of: Option<Series>) -> Vec<f64> 
     rates.into_iter().map(|rate| rate / TAU).collect()
 }
 
+/// The slower frequency at which what is left of any series, or of one alone, swings most clearly, Hz: below those of [`frequencies_hz`], with
+/// two periods in a recording or more.
+pub(crate) fn slow_frequency_hz(samples: &Samples, of: Option<Series>) -> Option<f64> {
+    let rates = clearest(samples.left.par_iter().filter_map(|left| {
+        let shape = of
+            .is_none_or(|series| series == left.series)
+            .then(|| wave_over_time(samples, left, Factor::One, Band::Slow))??;
+        rate_and_gain(shape, samples, left)
+    }));
+    rates.first().map(|rate| rate / TAU)
+}
+
 /// Rate of a wave, and how much it takes off what is left of a series.
 fn rate_and_gain(shape: Shape, samples: &Samples, left: &Left) -> Option<(f64, f64)> {
     let gain = shape.fit(samples, &left.soft)?.removed();
@@ -201,9 +213,23 @@ fn tried(samples: &Samples, left: &Left) -> impl Iterator<Item = (Shape, Fitted)
     shapes.into_iter().filter_map(|shape| Some((shape, shape.fit(samples, &left.soft)?)))
 }
 
+/// Frequencies among which a wave over time is looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Band {
+    /// [`FREQUENCIES_HZ`].
+    Fast,
+    /// From two periods in the recording up to those.
+    Slow,
+}
+
+/// Wave over time, times the current or not. What grows with the current is looked for among slow ones alone.
+fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
+    wave_over_time(samples, left, times, if times == Factor::Current { Band::Slow } else { Band::Fast })
+}
+
 /// Wave over time, times the current or not, that takes most off the rows that may be fitted, in the longest recording. Where the motion
 /// repeats itself, what is left in the same way in every period is left out: it may as well follow the motion.
-fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
+fn wave_over_time(samples: &Samples, left: &Left, times: Factor, band: Band) -> Option<Shape> {
     let t_s = samples.variable(Variable::Time)?;
     let weights = if times == Factor::Current { Some(samples.variable(Variable::Current)?) } else { None };
     let longest = longest(samples)?;
@@ -220,9 +246,10 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     let all =
         samples.recording.iter().zip(t_s).filter(|(r, t)| **r == longest && **t < FREQUENCY_WINDOW_S).count();
     let spacing_s = (last_s - first_s) / all as f64;
-    let (lowest_hz, highest_hz) = match times {
-        Factor::Current => (FEWEST_SWINGS / (last_s - first_s), FASTEST_SWING_HZ),
-        _ => FREQUENCIES_HZ,
+    let (lowest_hz, highest_hz) = match (band, times) {
+        (Band::Fast, _) => FREQUENCIES_HZ,
+        (Band::Slow, Factor::Current) => (FEWEST_SWINGS / (last_s - first_s), FASTEST_SWING_HZ),
+        (Band::Slow, _) => (FEWEST_SWINGS / (last_s - first_s), FREQUENCIES_HZ.0),
     };
     let highest_hz = highest_hz.min(0.45 / spacing_s);
     if rows.len() < 100 || highest_hz <= lowest_hz {
@@ -231,7 +258,7 @@ fn frequency(samples: &Samples, left: &Left, times: Factor) -> Option<Shape> {
     if let Some(period_s) = motion_period_s(samples, longest) {
         without_what_repeats(&mut table.values, &table.x, period_s, spacing_s);
     }
-    let step = PI / (last_s - first_s) / if times == Factor::Current { 2.0 } else { 1.0 };
+    let step = PI / (last_s - first_s) / if band == Band::Slow { 2.0 } else { 1.0 };
     let rate = best_rate(&table, (TAU * lowest_hz, TAU * highest_hz), step)?;
     Some(Shape::Wave { of: Variable::Time, rate, waves: 1, times })
 }
