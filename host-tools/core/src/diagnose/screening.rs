@@ -35,9 +35,9 @@ const STRONGEST: f64 = 3.0;
 /// Times that a start is made that much stronger.
 const STRENGTHENED: usize = 8;
 
-/// Parts of the strength that an estimate asks for, of which the one that predicts best is taken: a loss that does not grow with the
+/// Share of what an estimate promises below which half of the strength that it asks for is tried too: a loss that does not grow with the
 /// square of large differences makes what changes them look weak.
-const PARTS_OF_ASKED: [f64; 2] = [1.0, 0.5];
+const KEPT_OF_PROMISE: f64 = 0.5;
 
 /// Share of what an effect changes that parameters change as well, from which on it is tried where they make room for it.
 const IN_PLACE_OF: f64 = 0.5;
@@ -205,15 +205,18 @@ impl Background<'_> {
         let strength = |start: &Screened| (start.start.parameters[0] - neutral).abs();
         for _ in 0..STRENGTHENED {
             let Some(asked) = linear else { break };
-            let weaker = |part: f64| {
-                let strength = neutral + part * (asked.start.parameters[0] - neutral);
-                let mut start = asked.start;
-                start.parameters[0] = strength;
-                self.judge(start)
-            };
-            let tried = PARTS_OF_ASKED.into_iter().filter_map(weaker);
-            let best_part = tried.max_by(|a, b| a.start.gain.total_cmp(&b.start.gain));
-            let Some(there) = best_part.filter(|there| there.start.gain > best.gain) else { break };
+            let mut there = self.judge(asked.start);
+            if there.as_ref().is_none_or(|there| there.start.gain < KEPT_OF_PROMISE * asked.gain) {
+                let mut weaker = asked.start;
+                weaker.parameters[0] = neutral + 0.5 * (weaker.parameters[0] - neutral);
+                let gain =
+                    |judged: &Option<Judged>| judged.as_ref().map_or(f64::MIN, |there| there.start.gain);
+                there = [there, self.judge(weaker)]
+                    .into_iter()
+                    .max_by(|a, b| gain(a).total_cmp(&gain(b)))
+                    .flatten();
+            }
+            let Some(there) = there.filter(|there| there.start.gain > best.gain) else { break };
             let grown = strength(&there.start) / strength(&best);
             best = there.start;
             if grown < 0.99 * STRONGEST {
@@ -376,7 +379,7 @@ mod tests {
 
     /// Tensions that swing by many times their scale, tried with the wrong sign: the estimate asks for twice what is right.
     #[test]
-    fn what_is_asked_for_too_strongly_is_tried_at_a_part_of_it() {
+    fn what_is_asked_for_too_strongly_is_tried_at_half_of_it() {
         let mut recording = test_bench::swung(6000);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let law = bowden_model::law::find("law_tendon_length_over_time").unwrap();

@@ -19,10 +19,8 @@ use crate::joint_model::{Drive, JointModel};
 /// that nothing turns.
 const PLAY_GUIDE: f64 = 0.6;
 
-/// Standard deviations of the angle within which the guide does not pull: half the width of a uniform distribution. While an encoder
-/// shows the same count the angle may be anywhere within that count, and there friction holds the tendons, whose tension a tenth of a count
-/// changes by newtons: what the motor says of it is better than the middle of the count.
-const GUIDE_DEAD_BAND: f64 = 1.732;
+/// Part of the angle's standard deviation within which the guide does not pull.
+const GUIDE_DEAD_BAND: f64 = 0.3;
 
 /// What holds the simulated angle to the recorded one.
 #[derive(Clone, Copy)]
