@@ -72,6 +72,8 @@ enum Command {
     Params(crate::commands::params::ParamsArguments),
     /// Show the fault of a driver board, what led to it, and clear it
     Faults(crate::commands::faults::FaultsArguments),
+    /// Write an image into a driver board, verify it, start it, and print its log
+    Flash(crate::commands::flash::FlashArguments),
     /// Print the log of a driver board's firmware, with time and level
     Log(crate::commands::log::LogArguments),
     /// Make a recording of a bench run that the firmware logged
@@ -134,6 +136,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Params(arguments) => arguments.run(),
         Command::Faults(arguments) => arguments.run(),
+        Command::Flash(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Log(arguments) => arguments.run(),
         Command::Import(arguments) => arguments.run(),
         Command::Doctor(arguments) => arguments.run(),

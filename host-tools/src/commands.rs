@@ -8,6 +8,7 @@ pub mod doctor;
 pub mod effect;
 pub mod faults;
 pub mod fit;
+pub mod flash;
 pub mod import;
 pub mod info;
 pub mod investigate;

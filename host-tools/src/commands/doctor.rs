@@ -134,7 +134,7 @@ fn probe(probes: &[Device]) -> Check {
             "probe",
             Grade::Hint,
             "no ST-LINK on USB: a board cannot be flashed over its probe",
-            "connect the Nucleo board's USB socket CN1, which is its probe",
+            "connect the Nucleo board's USB socket CN1, which is its probe, or flash over the board's own USB lines: bowden flash ELF --dfu",
         );
     };
     match first.forbidden() {

@@ -35,12 +35,19 @@ pub struct LogArguments {
     elf: PathBuf,
     /// File of logged bytes; `-` for standard input
     log: PathBuf,
+    #[command(flatten)]
+    format: LogFormat,
+}
+
+/// Which lines of a log are printed, and how.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct LogFormat {
     /// Lowest level to print; lines without one are always printed
     #[arg(long, value_enum, default_value = "trace")]
     level: Level,
     /// Print JSON: one object a line
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 impl LogArguments {
@@ -53,12 +60,20 @@ impl LogArguments {
         let image = load_image(&self.elf)?;
         let mut decoder = LogDecoder::new(&image);
         let name = self.log.display();
-        each_piece(&self.log, |bytes| {
-            decoder.take(bytes)?.iter().filter(|line| self.shows(line)).try_for_each(|line| self.print(line))
-        })?;
+        each_piece(&self.log, |bytes| self.format.print(&decoder.take(bytes)?))?;
         let mut outcome = Outcome::done();
         outcome.extend(decoder.finish()?.map(|note| format!("{name}: {note}")));
         Ok(outcome)
+    }
+}
+
+impl LogFormat {
+    /// Prints lines as they come.
+    ///
+    /// # Errors
+    /// Exit status 1, if standard output refuses.
+    pub(super) fn print(&self, lines: &[LogLine]) -> Result<(), Failure> {
+        lines.iter().filter(|line| self.shows(line)).try_for_each(|line| self.print_line(line))
     }
 
     fn shows(&self, line: &LogLine) -> bool {
@@ -73,7 +88,7 @@ impl LogArguments {
         level >= self.level
     }
 
-    fn print(&self, line: &LogLine) -> Result<(), Failure> {
+    fn print_line(&self, line: &LogLine) -> Result<(), Failure> {
         if !self.json {
             return print(&format!("{line}\n"));
         }
