@@ -310,6 +310,21 @@ fn drag_with_the_square_of_speed_is_put_into_a_formula() {
     outcome.predicts_within(0.5);
 }
 
+/// Drag of 0.15 N·m at 1 rad/s in positive direction and none in the other: half of it in the mean, all of it asymmetric.
+#[test]
+fn drag_in_one_direction_is_put_into_a_formula() {
+    let valve = UnlistedJoint { law: JointLaw::OneWayDrag, size_nm: 0.15, place: 0.0 };
+    let outcome = Outcome::of(&Case::new("case", vec![valve.into()], 116, 3.0));
+    let law = outcome.states_only("joint_friction_nm", "omega_out_rad_s");
+    let found = |name: &str| law.coefficients[name].value;
+    for (name, concealed, tolerance) in
+        [("amplitude_nm", 0.075, 0.01), ("exponent", 1.0, 0.15), ("asymmetry", 1.0, 0.15)]
+    {
+        assert!((found(name) - concealed).abs() < tolerance, "{name}: {} for {concealed}", found(name));
+    }
+    outcome.predicts_within(0.5);
+}
+
 #[test]
 fn an_output_pulley_that_is_not_round_is_put_into_a_formula() {
     let lobes =

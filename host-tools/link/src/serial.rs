@@ -262,6 +262,7 @@ mod tests {
                 serial_number: number.map(str::to_owned),
                 manufacturer: None,
                 product: None,
+                interface: None,
             })
         });
         SerialPortInfo { port_name: name.to_owned(), port_type }

@@ -77,6 +77,13 @@ fn stated(effect: &ConcealedEffect) -> Option<Stated> {
             match e.law {
                 JointLaw::SquareDrag => drag(2.0),
                 JointLaw::RootDrag => drag(0.5),
+                JointLaw::OneWayDrag => {
+                    let formula =
+                        format!("amplitude_nm * (1 + asymmetry * sign({speed})) * abs({speed})^exponent");
+                    let coefficients =
+                        vec![("amplitude_nm", 0.5 * size), ("exponent", 1.0), ("asymmetry", 1.0)];
+                    law("joint", "joint_friction_nm", speed, formula, coefficients)
+                }
                 JointLaw::CubicSpring => {
                     let formula = format!("amplitude_nm * sign({angle}) * abs({angle})^exponent");
                     let coefficients = vec![("amplitude_nm", -size), ("exponent", 3.0)];

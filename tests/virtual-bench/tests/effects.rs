@@ -693,6 +693,19 @@ fn unlisted_torques_act_by_their_formulas() {
     close(at(0.6), 0.036, 0.1, "square of 0.6 rad/s");
     close(at(0.8), 0.064, 0.1, "square of 0.8 rad/s");
 
+    let valve = UnlistedJoint { law: JointLaw::OneWayDrag, size_nm: 0.1, place: 0.0 };
+    let with = run(&bench(), valve, &reference);
+    let at = |wanted: f64| {
+        mean_where(
+            base.len(),
+            |k| steady(&reference, k) && (speed(&reference, k) - wanted).abs() < 0.02,
+            |k| extra_joint_nm(&with, &base, k),
+        )
+    };
+    close(at(0.8), 0.08, 0.1, "one way, 0.8 rad/s");
+    let back_nm = at(-0.8);
+    assert!(back_nm.abs() < 0.008, "the other way: {back_nm} N m");
+
     let spring = UnlistedJoint { law: JointLaw::CubicSpring, size_nm: 1.0, place: 0.0 };
     let with = run(&bench(), spring, &reference);
     let at = |angle: f64| {

@@ -15,6 +15,8 @@ pub enum JointLaw {
     SquareDrag,
     /// Against the motion, with the root of speed: a shear-thinning grease.
     RootDrag,
+    /// Against the motion, with the speed, in positive direction alone: a damper with a check valve.
+    OneWayDrag,
     /// Back to zero, with the cube of the angle: a rubber boot.
     CubicSpring,
     /// A dry friction within a short range of the angle: a lip that rubs.
@@ -44,6 +46,7 @@ impl Describe for UnlistedJoint {
         let law = draw.one_of(&[
             JointLaw::SquareDrag,
             JointLaw::RootDrag,
+            JointLaw::OneWayDrag,
             JointLaw::CubicSpring,
             JointLaw::RubbingRange,
             JointLaw::TriangleRipple,
@@ -52,6 +55,7 @@ impl Describe for UnlistedJoint {
         let (size_nm, place) = match law {
             JointLaw::SquareDrag => (0.08, 0.0),
             JointLaw::RootDrag => (0.12, 0.0),
+            JointLaw::OneWayDrag => (0.15, 0.0),
             JointLaw::CubicSpring => (0.5, 0.0),
             JointLaw::RubbingRange => (0.15, draw.sign() * draw.uniform(0.1, 0.4)),
             JointLaw::TriangleRipple => (0.12, draw.one_of(&[9.0, 14.0, 22.0])),
@@ -76,6 +80,7 @@ impl UnlistedJoint {
         let shape = match self.law {
             JointLaw::SquareDrag => -omega_rad_per_s * omega_rad_per_s.abs(),
             JointLaw::RootDrag => against * omega_rad_per_s.abs().sqrt(),
+            JointLaw::OneWayDrag => -omega_rad_per_s.max(0.0),
             JointLaw::CubicSpring => -theta_rad.powi(3),
             JointLaw::RubbingRange => against / (1.0 + ((theta_rad - self.place) / 0.08).powi(6)),
             JointLaw::TriangleRipple => {
