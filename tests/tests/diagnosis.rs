@@ -183,12 +183,13 @@ fn stop_that_gives_way() {
     outcome.predicts_within(0.9);
 }
 
+/// The moment lies within a second that is fitted; the data say nothing of one in a second that is held out.
 #[test]
 fn lost_pretension() {
-    let case = Case::new("case", vec![PretensionLoss { loss: 0.25, onset_s: 11.0 }.into()], 102, 3.0);
+    let case = Case::new("case", vec![PretensionLoss { loss: 0.25, onset_s: 9.4 }.into()], 102, 3.0);
     let outcome = Outcome::of(&case);
     let effect = outcome.names_only("pretension_loss", "transmission");
-    assert!((effect.onset_s.unwrap() - 11.0).abs() < 0.3, "{:?}", effect.onset_s);
+    assert!((effect.onset_s.unwrap() - 9.4).abs() < 0.1, "{:?}", effect.onset_s);
     outcome.predicts_within(0.3);
 }
 
