@@ -123,9 +123,11 @@ impl Motion {
         }
     }
 
-    /// In words.
+    /// In words, with the numbers as the board takes them.
     pub fn words(&self) -> String {
-        let Self { amplitude, offset, frequency_hz, seconds, .. } = self;
+        let [amplitude, offset, frequency_hz] =
+            [self.amplitude, self.offset, self.frequency_hz].map(|value| value as f32);
+        let seconds = self.seconds;
         let unit = if self.mode.follows_torque() { "N m" } else { "rad" };
         let mode = mode_name(self.mode);
         match self.shape {
@@ -320,4 +322,24 @@ fn read_motion(section: &Section) -> Result<Motion, Failure> {
         seconds: 0.0,
         every: section.integer("every", 1, 1_000_000)?.unwrap_or(1).into(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A third of a hertz by way of three times a ninth has a digit too many for a reader, and for the board.
+    #[test]
+    fn a_motion_is_told_with_the_numbers_that_the_board_takes() {
+        let motion = Motion {
+            mode: Mode::Position,
+            shape: Some(Shape::Sine),
+            amplitude: 0.1 + 0.2,
+            offset: 0.0,
+            frequency_hz: 0.1111 * 3.0,
+            seconds: 12.0,
+            every: 10,
+        };
+        assert_eq!(motion.words(), "sine of 0.3 rad at 0.3333 Hz around 0 rad, position, 12 s");
+    }
 }
