@@ -702,7 +702,7 @@ fn unlisted_torques_act_by_their_formulas() {
             |k| extra_joint_nm(&with, &base, k),
         )
     };
-    close(at(0.8), 0.08, 0.1, "one way, 0.8 rad/s");
+    close(at(0.6), 0.06, 0.1, "one way, 0.6 rad/s");
     let back_nm = at(-0.8);
     assert!(back_nm.abs() < 0.008, "the other way: {back_nm} N m");
 
