@@ -95,13 +95,8 @@ impl Image {
     }
 
     /// Bytes that are written.
-    pub fn len(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.runs.iter().map(|run| run.bytes.len()).sum()
-    }
-
-    /// Whether nothing is written; never so for an image that was taken.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Address of the control block of its log, if it has one.
@@ -242,6 +237,16 @@ mod tests {
         let mut code = vec![0x5a; bytes];
         code[..8].copy_from_slice(&[0x00, 0x00, 0x02, 0x20, 0x09, 0x00, 0x00, 0x08]);
         code
+    }
+
+    /// Where the firmware puts its ripple table, the first of what it stores, is where an image ends.
+    #[test]
+    fn an_image_ends_where_the_firmware_stores() {
+        let source = include_str!("../../../firmware/board/src/main.rs");
+        let (_, place) = source.split_once("const TABLE_STORE: core::ops::Range<u32> = 0x").unwrap();
+        let (offset, _) = place.split_once("..").unwrap();
+        let offset = u32::from_str_radix(&offset.replace('_', ""), 16).unwrap();
+        assert_eq!(FLASH_START + offset, IMAGE_END);
     }
 
     #[test]

@@ -125,7 +125,7 @@ impl FlashArguments {
         let written = Written {
             image: self.elf.display().to_string(),
             through,
-            bytes: image.len(),
+            bytes: image.bytes(),
             seconds: started.elapsed().as_secs_f64(),
             verified: true,
         };

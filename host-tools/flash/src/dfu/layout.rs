@@ -8,7 +8,6 @@ use crate::image::{FLASH_BYTES, FLASH_START, IMAGE_END, Image};
 /// Pages of a memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
-    name: String,
     /// First address, bytes of a page, pages; one after the other.
     groups: Vec<Group>,
 }
@@ -36,7 +35,8 @@ impl Layout {
     /// Reads a description such as `@Internal Flash   /0x08000000/256*02Kg`.
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.trim().strip_prefix('@')?.split('/');
-        let name = parts.next()?.trim().to_owned();
+        // Its name.
+        parts.next()?;
         let mut groups = Vec::new();
         while let Some(address) = parts.next() {
             let mut start = u32::from_str_radix(address.trim().strip_prefix("0x")?, 16).ok()?;
@@ -46,7 +46,7 @@ impl Layout {
                 groups.push(group);
             }
         }
-        (!groups.is_empty()).then_some(Self { name, groups })
+        (!groups.is_empty()).then_some(Self { groups })
     }
 
     /// `256*02Kg`: pages, bytes with a unit (B or a space, K, M), and a letter from `a` on whose low three bits are the access.
@@ -107,7 +107,6 @@ mod tests {
         // As an STM32G474, an STM32F405 and the option bytes of an STM32G4 call themselves.
         let g4 = Layout::parse("@Internal Flash   /0x08000000/256*02Kg").unwrap();
         assert_eq!(g4.describe(), "256 pages of 2048 bytes from 0x08000000 on");
-        assert_eq!(g4.name, "Internal Flash");
         let f4 = Layout::parse("@Internal Flash  /0x08000000/04*016Kg,01*064Kg,07*128Kg").unwrap();
         assert_eq!(
             f4.describe(),

@@ -31,12 +31,12 @@ pub fn write<D: DfuDevice>(device: &mut D, image: &Image, progress: &dyn Progres
         client.erase(page.start)?;
         progress.advance(1);
     }
-    progress.stage("writing", image.len() as u64);
+    progress.stage("writing", image.bytes() as u64);
     for (address, block) in blocks(image, client.block_bytes()) {
         client.write(address, block)?;
         progress.advance(block.len() as u64);
     }
-    progress.stage("verifying", image.len() as u64);
+    progress.stage("verifying", image.bytes() as u64);
     for (address, block) in blocks(image, client.block_bytes()) {
         let found = client.read(address, block.len())?;
         compare(address, block, &found)?;

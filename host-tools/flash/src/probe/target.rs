@@ -96,7 +96,7 @@ impl Target {
         // Behind the reset no cache holds what was there before.
         core.reset_and_halt(RESET_PATIENCE)
             .map_err(|error| failure("resetting the processor", false, &error))?;
-        progress.stage("verifying", image.len() as u64);
+        progress.stage("verifying", image.bytes() as u64);
         for run in image.runs() {
             for (index, block) in run.bytes.chunks(BLOCK_BYTES).enumerate() {
                 let address = run.address + (index * BLOCK_BYTES) as u32;
