@@ -8,7 +8,7 @@ use bowden_model::parameters::MotorParameters;
 
 use super::candidates::{Candidate, fits, targets};
 use super::unexplained::samples::{Samples, Variable as Seen};
-use super::unexplained::structure::{frequencies_hz, rates_along, slow_frequency_hz};
+use super::unexplained::structure::{frequencies_hz, rates_along};
 use crate::fit::objective::{Objective, Series};
 use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
@@ -66,7 +66,7 @@ pub(super) fn law_candidates(
         motor: model.parameters.motor,
         input_rates: rates_along(&samples, Seen::ThetaIn),
         joint_rates: rates_along(&samples, Seen::ThetaOut),
-        frequencies_hz: swings_hz(&samples, None),
+        frequencies_hz: frequencies_hz(&samples, None),
         samples,
     };
     let mut found = Vec::new();
@@ -106,25 +106,16 @@ impl Ground<'_> {
             Form::Hysteresis => self.loops(law, base),
             Form::PowerFromOne => EXPONENTS_FROM_ONE.map(|exponent| base.with("exponent", exponent)).to_vec(),
             Form::Power | Form::EvenPower => {
-                let usual = self.usual(law.variable());
-                let size = base.parameters[0];
-                let start = |exponent: &f64| {
-                    base.with("exponent", *exponent).with("amplitude_nm", size / usual.powf(*exponent))
-                };
                 // Behind the input pulley a spring has a name, before it none.
                 let least = if law.port() == Port::MotorTorque { Some(&1.0) } else { None };
                 let exponents = least.into_iter().chain(&EXPONENTS);
-                if usual > 0.0 { exponents.map(start).collect() } else { Vec::new() }
+                exponents.filter_map(|exponent| self.as_large_at(law, base, *exponent)).collect()
             }
             Form::DirectedPower => {
-                let usual = self.usual(law.variable());
-                let size = base.parameters[0];
                 let start = |[exponent, asymmetry]: [f64; 2]| {
-                    base.with("exponent", exponent)
-                        .with("asymmetry", asymmetry)
-                        .with("amplitude_nm", size / usual.powf(exponent))
+                    Some(self.as_large_at(law, base, exponent)?.with("asymmetry", asymmetry))
                 };
-                if usual > 0.0 { BY_DIRECTION.map(start).to_vec() } else { Vec::new() }
+                BY_DIRECTION.into_iter().filter_map(start).collect()
             }
             Form::Wave => {
                 let rates = match law.variable() {
@@ -136,7 +127,7 @@ impl Ground<'_> {
             }
             Form::Oscillation => {
                 let own = match base.target {
-                    Target::One(channel) => swings_hz(&self.samples, Some(Series::Channel(channel))),
+                    Target::One(channel) => frequencies_hz(&self.samples, Some(Series::Channel(channel))),
                     _ => self.frequencies_hz.clone(),
                 };
                 waves(base, "frequency_hz", &own)
@@ -157,6 +148,13 @@ impl Ground<'_> {
                 SETTING_IN.into_iter().flat_map(either).collect()
             }
         }
+    }
+
+    /// A power law with another exponent that is as large where the variable is as it usually is; none where it does not change.
+    fn as_large_at(&self, law: &Law, base: ActiveEffect, exponent: f64) -> Option<ActiveEffect> {
+        let (usual, size) = (self.usual(law.variable()), base.parameters[0]);
+        let amplitude_nm = size / usual.powf(exponent);
+        (usual > 0.0).then(|| base.with("exponent", exponent).with("amplitude_nm", amplitude_nm))
     }
 
     /// A loop over the angle of a part, or over what a sensor shows.
@@ -227,11 +225,6 @@ fn range<'a>(values: impl Iterator<Item = &'a f64>) -> Option<(f64, f64)> {
         let (low, high) = ends.unwrap_or((*x, *x));
         Some((low.min(*x), high.max(*x)))
     })
-}
-
-/// Frequencies at which something may swing, Hz: fast ones, and the clearest slow one.
-fn swings_hz(samples: &Samples, of: Option<Series>) -> Vec<f64> {
-    frequencies_hz(samples, of).into_iter().chain(slow_frequency_hz(samples, of)).collect()
 }
 
 /// At every rate, both phases.

@@ -27,7 +27,7 @@ const HIGHEST_POSITION_RATE: f64 = 240.0;
 /// Most rates of position that are tried, however far the travel.
 const MOST_RATES: f64 = 20_000.0;
 
-/// Frequencies in time that are looked for, Hz: slower is a curve over time, faster is not resolved.
+/// Frequencies in time that are looked for, Hz: slower is a curve over time, or a law that swings; faster is not resolved.
 const FREQUENCIES_HZ: (f64, f64) = (2.0, 45.0);
 
 /// Fewest periods of a swing that grows with the current, in the recording, and its highest frequency, Hz.
@@ -135,7 +135,7 @@ fn most(forms: &[(Shape, Fitted)]) -> f64 {
     forms.iter().map(|(_, fitted)| fitted.removed()).fold(0.0, f64::max)
 }
 
-/// Most rates that [`rates_along`] and [`frequencies_hz`] yield.
+/// Most rates that [`rates_along`] yields, and [`frequencies_hz`] of fast ones.
 const MOST_STARTS: usize = 2;
 
 /// Radians of a wave per radian of a position in which what is left of any series repeats most clearly, the clearest first.
@@ -146,27 +146,19 @@ pub(crate) fn rates_along(samples: &Samples, of: Variable) -> Vec<f64> {
     }))
 }
 
-/// Frequencies at which what is left of any series, or of one alone, swings most clearly, Hz, the clearest first.
+/// Frequencies at which what is left of any series, or of one alone, swings most clearly, Hz: the fast ones, the clearest first, and the
+/// clearest slow one.
 pub(crate) fn frequencies_hz(samples: &Samples, of: Option<Series>) -> Vec<f64> {
-    let rates = clearest(samples.left.par_iter().filter_map(|left| {
-        let shape = of
-            .is_none_or(|series| series == left.series)
-            .then(|| frequency(samples, left, Factor::One))??;
-        rate_and_gain(shape, samples, left)
-    }));
-    rates.into_iter().map(|rate| rate / TAU).collect()
-}
-
-/// The slower frequency at which what is left of any series, or of one alone, swings most clearly, Hz: below those of [`frequencies_hz`], with
-/// two periods in a recording or more.
-pub(crate) fn slow_frequency_hz(samples: &Samples, of: Option<Series>) -> Option<f64> {
-    let rates = clearest(samples.left.par_iter().filter_map(|left| {
-        let shape = of
-            .is_none_or(|series| series == left.series)
-            .then(|| wave_over_time(samples, left, Factor::One, Band::Slow))??;
-        rate_and_gain(shape, samples, left)
-    }));
-    rates.first().map(|rate| rate / TAU)
+    let rates = |band| {
+        clearest(samples.left.par_iter().filter_map(|left| {
+            let shape = of
+                .is_none_or(|series| series == left.series)
+                .then(|| wave_over_time(samples, left, Factor::One, band))??;
+            rate_and_gain(shape, samples, left)
+        }))
+    };
+    let (fast, slow) = (rates(Band::Fast), rates(Band::Slow));
+    fast.iter().chain(slow.first()).map(|rate| rate / TAU).collect()
 }
 
 /// Rate of a wave, and how much it takes off what is left of a series.

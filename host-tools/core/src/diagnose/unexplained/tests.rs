@@ -141,6 +141,19 @@ fn an_oscillation_of_one_channel_is_a_sensors_with_its_frequency() {
     assert!((hz - 13.3).abs() < 0.02, "{hz} Hz");
 }
 
+/// Six periods in the 40 s, beside a motion of 0.083 and 0.37 Hz.
+#[test]
+fn a_slow_swing_is_among_the_frequencies_that_laws_start_from() {
+    let swing = |k: usize| 1.5 * (TAU * 0.143 * 0.01 * k as f64 + 1.0).sin();
+    let rows = [Channel::F2, Channel::F4]
+        .map(|channel| left(channel, sum(&noise(channel as u64), (0..ROWS).map(swing))));
+    let samples = samples(rows.to_vec());
+    for of in [None, Some(Series::Channel(Channel::F4))] {
+        let found = frequencies_hz(&samples, of);
+        assert!(found.iter().any(|hz| (hz - 0.143).abs() < 0.002), "{found:?} Hz");
+    }
+}
+
 /// A motion of 0.25 and 0.75 Hz passes everything again after 4 s. So does 3.25 Hz, thirteen times in 4 s; 3.4 Hz does not.
 #[test]
 fn an_oscillation_is_told_from_what_a_repeated_motion_leaves_in_every_period() {
