@@ -45,9 +45,9 @@ def survey_on_ray(
     done: set[str] = set()
     running: dict[Any, str] = {}
     waiting = iter(pending)
-    # Ray has types, but not for this; where it is not installed there is nothing to ignore.
-    cluster_resources: Callable[[], dict[str, float]] = vars(ray)["cluster_resources"]
-    most = max(1, int(_AHEAD * cluster_resources().get("CPU", 1)))
+    # Ray has types, but none for this.
+    cluster: Any = ray
+    most = max(1, int(_AHEAD * cluster.cluster_resources().get("CPU", 1)))
     try:
         while True:
             while len(running) < most and (task := next(waiting, None)) is not None:
