@@ -8,7 +8,7 @@ mod common;
 use std::fs;
 use std::path::Path;
 
-use bowden_flash::dfu;
+use bowden_flash::dfu::{NativeUsb, Usb};
 use common::bowden;
 
 /// A probe that nobody has.
@@ -184,11 +184,17 @@ fn a_boot_loader_that_is_not_there_is_said_with_what_to_do() {
     fs::write(folder.path().join("a.elf"), Elf::firmware().bytes()).unwrap();
     let port = |port| ["flash", "a.elf", "--dfu", "--port", port];
     refused(folder.path(), &port("sim"), "sim: a simulated board has no flash", "; name the port of a board");
-    for wrong in [&["--dfu", "--log"][..], &["--dfu", "--probe", NO_PROBE], &["--port", "auto"]] {
+    for wrong in [
+        &["--dfu", "--log"][..],
+        &["--boot-loader", "1-2"],
+        &["--dfu", "--port", "auto", "--boot-loader", "1-2"],
+        &["--dfu", "--probe", NO_PROBE],
+        &["--port", "auto"],
+    ] {
         let arguments = [&["flash", "a.elf"], wrong].concat();
         refused(folder.path(), &arguments, "", "see `bowden --help`");
     }
-    if dfu::usb::is_there(dfu::VENDOR, dfu::PRODUCT) {
+    if !(NativeUsb { board: (0x1209, 0xb0d7) }).boot_loaders().is_empty() {
         println!("skipped: a boot loader is connected");
         return;
     }

@@ -7,16 +7,25 @@
 //! | [`layout`] | the pages of its flash |
 //! | [`client`] | its commands, one method each |
 //! | [`write`](mod@write) | an image, from the first check to the jump into it |
-//! | [`usb`] | boot loaders that are plugged in |
+//! | [`plugged`] | which board, where several are plugged in |
+//! | [`serial_number`] | serial numbers of a board and of its boot loader |
+//! | [`change`] | a board from its firmware to its boot loader and back |
+//! | [`usb`] | what is plugged into this machine |
 
+pub mod change;
 pub mod client;
 pub mod device;
 pub mod layout;
+pub mod plugged;
+pub mod serial_number;
 pub mod status;
 pub mod usb;
 pub mod write;
 
+pub use change::{InBootLoader, open, send};
 pub use device::{DfuDevice, TransferError};
+pub use plugged::{Plugged, Usb};
+pub use usb::NativeUsb;
 pub use write::write;
 
 /// USB vendor of the boot loader: ST.

@@ -40,10 +40,31 @@ pub enum FlashError {
         seconds: u64,
     },
     /// More than one boot loader.
-    #[error("{} boot loaders on USB (serial numbers {}); disconnect the others", found.len(), found.join(", "))]
+    #[error(
+        "{} boot loaders on USB ({}); choose one with --boot-loader and its serial number or socket", found.len(), found.join(", ")
+    )]
     SeveralBootLoaders {
-        /// Serial numbers.
+        /// Their serial numbers and sockets.
         found: Vec<String>,
+    },
+    /// No boot loader is the one that was asked for.
+    #[error("no boot loader is {wanted} ({}); correct --boot-loader", found.join(", "))]
+    OtherBootLoaders {
+        /// What was asked for.
+        wanted: String,
+        /// Serial numbers and sockets of those that are there.
+        found: Vec<String>,
+    },
+    /// The image is written, and the board does not come back.
+    #[error(
+        "the image is written, but {} on USB after {seconds} s; switch it off and on, with BOOT0 no longer at 3.3 V",
+        absent(serial.as_deref())
+    )]
+    FirmwareLate {
+        /// Serial number of the board, if it is known.
+        serial: Option<String>,
+        /// How long it was waited for, s.
+        seconds: u64,
     },
     /// The operating system does not let this user.
     #[error("{device}: this user may not open it")]
@@ -147,6 +168,13 @@ fn others(found: &[String]) -> String {
     }
 }
 
+fn absent(serial: Option<&str>) -> String {
+    serial.map_or_else(
+        || "no board is newly".to_owned(),
+        |serial| format!("the board with serial number {serial} is not"),
+    )
+}
+
 fn revived(whole: bool) -> String {
     if whole {
         "its flash is as it was: check the USB cable, switch it off and on, and flash it again".to_owned()
@@ -171,6 +199,7 @@ impl From<FlashError> for Failure {
             | FlashError::SeveralProbes { .. }
             | FlashError::NoBootLoader
             | FlashError::SeveralBootLoaders { .. }
+            | FlashError::OtherBootLoaders { .. }
             | FlashError::NotAllowed { .. }
             | FlashError::Unusable { .. }
             | FlashError::OtherChip { .. } => Self::bad_input(error),

@@ -7,27 +7,25 @@ use std::time::{Duration, Instant};
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
-use bowden_flash::dfu::usb::{self, UsbDevice};
-use bowden_flash::dfu::{self, DfuDevice};
+use bowden_flash::dfu::{self, DfuDevice, InBootLoader, NativeUsb, usb::UsbDevice};
 use bowden_flash::image::{Image, Kind};
 use bowden_flash::probe::{self, DebugProbeSelector, Lister, Target};
 use bowden_flash::{FlashError, probe::find::selector};
 use bowden_host_link::firmware_log::{LogDecoder, LogImage};
 use bowden_host_link::serial::{USB_PRODUCT, USB_VENDOR, udev_rule};
+use bowden_host_link::{LinkError, SIM};
 use serde::Serialize;
 
 use super::log::LogFormat;
 use super::print;
 use crate::interrupt;
+use crate::progress::UntilInterrupted;
 
 /// Time that a board gets for an answer.
 const TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// Time that a board gets from its firmware to its boot loader, and from there back.
-const CHANGE_PATIENCE: Duration = Duration::from_secs(10);
-
-/// Time between two looks at what is plugged in.
-const LOOK: Duration = Duration::from_millis(100);
+/// USB of this machine.
+const USB: NativeUsb = NativeUsb { board: (USB_VENDOR, USB_PRODUCT) };
 
 /// Arguments of `bowden flash`.
 #[derive(Clone, Debug, clap::Args)]
@@ -54,6 +52,10 @@ pub struct FlashArguments {
     /// With --dfu, board that runs its firmware and is sent to its boot loader: a serial port, `auto`, or `serial:NUMBER`
     #[arg(long, value_name = "PATH|auto|serial:NUMBER", requires = "dfu")]
     port: Option<String>,
+    /// With --dfu, where several boards are in their boot loader: serial number of the boot loader or of the board, or USB socket
+    /// (BUS-PORT), as `bowden flash` lists them
+    #[arg(long, value_name = "NUMBER|SOCKET", requires = "dfu", conflicts_with = "port")]
+    boot_loader: Option<String>,
     /// Take an image that is not the board's firmware, such as `bowden-measure`
     #[arg(long)]
     other: bool,
@@ -101,22 +103,18 @@ impl FlashArguments {
     }
 
     fn through_boot_loader(&self, image: &Image, progress: &dyn Progress) -> Result<Outcome, Failure> {
-        let mut device = match &self.port {
-            None => UsbDevice::find().map_err(failure)?,
-            Some(port) => enter(port, progress)?,
+        let mut board = match &self.port {
+            None => dfu::open(&USB, self.boot_loader.as_deref()).map_err(failure)?,
+            Some(port) => send(port, progress)?,
         };
         let started = Instant::now();
-        dfu::write(&mut device, image, progress).map_err(failure)?;
-        let through = device.name().to_owned();
-        drop(device);
-        self.say(image, through, started)?;
+        dfu::write(&mut board.device, image, progress).map_err(failure)?;
+        self.say(image, board.device.name().to_owned(), started)?;
         let mut outcome = Outcome::done();
-        if !self.other && !comes_back(progress) {
-            outcome.extend([format!(
-                "the image is written, but no board ({USB_VENDOR:04x}:{USB_PRODUCT:04x}) is on USB after {} s; switch it off and on, \
-                 with BOOT0 no longer at 3.3 V",
-                CHANGE_PATIENCE.as_secs()
-            )]);
+        if !self.other
+            && let Err(late) = board.await_firmware(&USB, &UntilInterrupted(progress))
+        {
+            outcome.extend([late.to_string()]);
         }
         Ok(outcome)
     }
@@ -162,34 +160,39 @@ fn rtt(name: &str, image: &Image) -> Result<u32, Failure> {
     })
 }
 
-/// Sends a board to its boot loader and waits for it.
-fn enter(port: &str, progress: &dyn Progress) -> Result<UsbDevice, Failure> {
-    if port == "sim" || port.starts_with("sim:") {
+/// Sends a board to its boot loader and waits for that.
+fn send(port: &str, progress: &dyn Progress) -> Result<InBootLoader<UsbDevice>, Failure> {
+    if port == SIM || port.starts_with("sim:") {
         return Err(Failure::bad_input(format!(
             "{port}: a simulated board has no flash; name the port of a board"
         )));
     }
-    if usb::is_there(dfu::VENDOR, dfu::PRODUCT) {
-        return Err(Failure::bad_input(
-            "a boot loader (0483:df11) is on USB already; leave out --port to flash that board, or disconnect it",
-        ));
-    }
-    bowden_host_link::connect(port, TIMEOUT)?.enter_boot_loader()?;
-    progress.stage("waiting for the boot loader", 0);
-    UsbDevice::await_one(CHANGE_PATIENCE).map_err(failure)
+    let mut client = bowden_host_link::connect(port, TIMEOUT)?;
+    let serial = Some(client.greeting().serial.as_str().to_owned()).filter(|serial| !serial.is_empty());
+    // Moved, so that the port is closed once the board has left it.
+    let leave = move || Ok(client.enter_boot_loader()?);
+    dfu::send(&USB, serial, leave, progress).map_err(|error| match error {
+        Sent::Flash(error) => failure(error),
+        Sent::Link(error) => error.into(),
+    })
 }
 
-/// Whether the firmware appears on USB.
-fn comes_back(progress: &dyn Progress) -> bool {
-    progress.stage("waiting for the firmware", 0);
-    let end = Instant::now() + CHANGE_PATIENCE;
-    while !interrupt::requested() && Instant::now() < end {
-        if usb::is_there(USB_VENDOR, USB_PRODUCT) {
-            return true;
-        }
-        std::thread::sleep(LOOK);
+/// Why a board is not in its boot loader.
+enum Sent {
+    Flash(FlashError),
+    Link(LinkError),
+}
+
+impl From<FlashError> for Sent {
+    fn from(error: FlashError) -> Self {
+        Self::Flash(error)
     }
-    false
+}
+
+impl From<LinkError> for Sent {
+    fn from(error: LinkError) -> Self {
+        Self::Link(error)
+    }
 }
 
 /// One line, with the rule that lets this user open a device where that is what is missing.

@@ -83,12 +83,23 @@ impl Plugged {
         arguments: &[&str],
         act: impl FnMut(&mut Board),
     ) -> Outcome<Ran> {
+        let before = self.arguments(command);
+        let line: Vec<&str> = before.iter().map(String::as_str).chain(arguments.iter().copied()).collect();
+        self.run_whole(&line, act)
+    }
+
+    /// Runs `bowden <line> --port <terminal>` while the board runs, with what `act` does to the board each time before it goes on.
+    pub fn run_line(&mut self, line: &[&str], act: impl FnMut(&mut Board)) -> Outcome<Ran> {
+        let port = self.terminal.path().to_string_lossy().into_owned();
+        self.run_whole(&[line, &["--port", &port]].concat(), act)
+    }
+
+    fn run_whole(&mut self, line: &[&str], act: impl FnMut(&mut Board)) -> Outcome<Ran> {
         let path = tool()?;
-        let what = format!("{} {command} {}", path.display(), arguments.join(" "));
+        let what = format!("{} {}", path.display(), line.join(" "));
         let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
         let child = Command::new(&path)
-            .args(self.arguments(command))
-            .args(arguments)
+            .args(line)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -1,20 +1,18 @@
-//! Boot loaders that are plugged in.
+//! Boards and boot loaders that are plugged into this machine.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nusb::descriptors::InterfaceDescriptor;
 use nusb::transfer::{ControlIn, ControlOut, ControlType, Recipient};
 use nusb::{DeviceInfo, ErrorKind, Interface, MaybeFuture};
 
 use super::device::{DfuDevice, TransferError};
+use super::plugged::{Plugged, Usb};
 use super::{PRODUCT, VENDOR};
 use crate::error::FlashError;
 
 /// How long a transfer may take.
 const TIMEOUT: Duration = Duration::from_secs(5);
-
-/// Time between two looks at what is plugged in.
-const LOOK: Duration = Duration::from_millis(100);
 
 /// Class and subclass of an interface that takes firmware (USB DFU 1.1, 4.2.3).
 const CLASS: (u8, u8) = (0xfe, 1);
@@ -37,38 +35,6 @@ pub struct UsbDevice {
 }
 
 impl UsbDevice {
-    /// Opens the one boot loader that is plugged in.
-    ///
-    /// # Errors
-    /// [`FlashError`]: there is none, or more than one, or it cannot be opened.
-    pub fn find() -> Result<Self, FlashError> {
-        match boot_loaders().as_slice() {
-            [] => Err(FlashError::NoBootLoader),
-            [device] => Self::open(device),
-            several => Err(FlashError::SeveralBootLoaders { found: several.iter().map(serial).collect() }),
-        }
-    }
-
-    /// The same, once one is plugged in.
-    ///
-    /// # Errors
-    /// [`FlashError::BootLoaderLate`], after `patience`; else as [`UsbDevice::find`].
-    pub fn await_one(patience: Duration) -> Result<Self, FlashError> {
-        let end = Instant::now() + patience;
-        loop {
-            match Self::find() {
-                Err(FlashError::NoBootLoader) if Instant::now() > end => {
-                    return Err(FlashError::BootLoaderLate { seconds: patience.as_secs() });
-                }
-                // Its file is there before the rule that gives it to this user has acted.
-                Err(FlashError::NotAllowed { .. }) if Instant::now() < end => {}
-                Err(FlashError::NoBootLoader) => {}
-                result => return result,
-            }
-            std::thread::sleep(LOOK);
-        }
-    }
-
     fn open(info: &DeviceInfo) -> Result<Self, FlashError> {
         let name = format!("boot loader {}", serial(info));
         let refuse = |error: nusb::Error| match error.kind() {
@@ -95,19 +61,44 @@ impl UsbDevice {
     }
 }
 
-/// Whether a device with this vendor and product is plugged in.
-pub fn is_there(vendor: u16, product: u16) -> bool {
-    devices(vendor, product).next().is_some()
+/// USB of this machine.
+#[derive(Clone, Copy, Debug)]
+pub struct NativeUsb {
+    /// Vendor and product of a board that runs its firmware.
+    pub board: (u16, u16),
 }
 
-fn boot_loaders() -> Vec<DeviceInfo> {
-    devices(VENDOR, PRODUCT).collect()
+impl Usb for NativeUsb {
+    type BootLoader = UsbDevice;
+
+    fn boot_loaders(&self) -> Vec<Plugged> {
+        devices((VENDOR, PRODUCT)).map(|info| plugged(&info)).collect()
+    }
+
+    fn boards(&self) -> Vec<Plugged> {
+        devices(self.board).map(|info| plugged(&info)).collect()
+    }
+
+    fn open(&self, boot_loader: &Plugged) -> Result<UsbDevice, FlashError> {
+        let info = devices((VENDOR, PRODUCT)).find(|info| plugged(info) == *boot_loader);
+        UsbDevice::open(&info.ok_or(FlashError::NoBootLoader)?)
+    }
+
+    fn wait(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 /// A machine without USB has no devices.
-fn devices(vendor: u16, product: u16) -> impl Iterator<Item = DeviceInfo> {
+fn devices(wanted: (u16, u16)) -> impl Iterator<Item = DeviceInfo> {
     let all = nusb::list_devices().wait().ok();
-    all.into_iter().flatten().filter(move |info| (info.vendor_id(), info.product_id()) == (vendor, product))
+    all.into_iter().flatten().filter(move |info| (info.vendor_id(), info.product_id()) == wanted)
+}
+
+fn plugged(info: &DeviceInfo) -> Plugged {
+    let ports: Vec<String> = info.port_chain().iter().map(u8::to_string).collect();
+    let socket = format!("{}-{}", info.bus_id().trim_start_matches('0'), ports.join("."));
+    Plugged { serial: info.serial_number().map(str::to_owned), socket }
 }
 
 fn serial(info: &DeviceInfo) -> String {

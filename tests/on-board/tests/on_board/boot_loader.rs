@@ -10,7 +10,7 @@ use crate::stop::moving;
 use crate::switched_on;
 
 /// The bridge has no timer that runs and no output, the gate driver sleeps.
-fn assert_bridge_locked(board: &Board) {
+pub fn assert_bridge_locked(board: &Board) {
     let pwm = board.pwm();
     assert_eq!((pwm.duty, pwm.main_output, pwm.enabled), (None, false, false));
 }

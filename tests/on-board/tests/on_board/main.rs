@@ -13,6 +13,7 @@ mod directions;
 mod failures;
 mod faults;
 mod flash;
+mod flash_over_usb;
 mod load;
 mod log;
 mod modes;
