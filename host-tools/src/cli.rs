@@ -12,7 +12,7 @@ use crate::commands::{
     check::CheckArguments, convert::ConvertArguments, fit::FitArguments, replay::ReplayArguments,
     simulate::SimulateArguments,
 };
-use crate::progress;
+use crate::progress::{self, under_way};
 
 /// Finds which physics a simulated tendon-driven joint lacks, from recordings of the real one
 #[derive(Debug, Parser)]
@@ -117,16 +117,16 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
             .map_err(|error| Failure::failed(format!("--jobs {jobs}: {error}")))?;
     }
     match &cli.command {
-        Command::Check(arguments) => arguments.run(),
+        Command::Check(arguments) => arguments.run(cli.quiet),
         Command::Diagnose(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Survey(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
-        Command::Convert(arguments) => under_way(cli, "converting", || arguments.run()),
-        Command::Info(arguments) => arguments.run(),
-        Command::Recover(arguments) => arguments.run(),
-        Command::Replay(arguments) => under_way(cli, "replaying", || arguments.run()),
-        Command::ReplayControl(arguments) => under_way(cli, "replaying", || arguments.run()),
+        Command::Convert(arguments) => under_way(cli.quiet, "converting", || arguments.run()),
+        Command::Info(arguments) => arguments.run(cli.quiet),
+        Command::Recover(arguments) => arguments.run(cli.quiet),
+        Command::Replay(arguments) => under_way(cli.quiet, "replaying", || arguments.run()),
+        Command::ReplayControl(arguments) => under_way(cli.quiet, "replaying", || arguments.run()),
         Command::Fit(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
-        Command::Simulate(arguments) => under_way(cli, "simulating", || arguments.run()),
+        Command::Simulate(arguments) => under_way(cli.quiet, "simulating", || arguments.run()),
         Command::Rig(arguments) => arguments.run(),
         Command::Export(arguments) => arguments.run(),
         Command::Effect(arguments) => arguments.run(),
@@ -138,19 +138,12 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Faults(arguments) => arguments.run(),
         Command::Flash(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Log(arguments) => arguments.run(),
-        Command::Import(arguments) => arguments.run(),
+        Command::Import(arguments) => arguments.run(cli.quiet),
         Command::Doctor(arguments) => arguments.run(),
         Command::Completions(arguments) => arguments.run(Cli::command()),
         Command::Man(arguments) => arguments.run(Cli::command()),
         Command::Send(arguments) => arguments.run(),
     }
-}
-
-/// Shows that work without steps goes on; for commands that print nothing meanwhile.
-fn under_way<T>(cli: &Cli, stage: &str, work: impl FnOnce() -> T) -> T {
-    let progress = progress::for_stderr(cli.quiet);
-    progress.stage(stage, 0);
-    work()
 }
 
 /// One line on stderr; a closed stderr is no reason to stop.

@@ -20,6 +20,13 @@ pub fn for_stderr(quiet: bool) -> Box<dyn Progress> {
     }
 }
 
+/// Shows that work without steps goes on, until it is done.
+pub fn under_way<T>(quiet: bool, stage: &str, work: impl FnOnce() -> T) -> T {
+    let progress = for_stderr(quiet);
+    progress.stage(stage, 0);
+    work()
+}
+
 /// Time between two lines where there is no terminal: short commands leave a log empty, long ones show life.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 

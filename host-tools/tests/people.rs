@@ -1,12 +1,18 @@
 //! What makes the command usable: completions, manual pages, `doctor`, facts as JSON, no colours in a pipe.
 
 mod common;
+#[path = "common/screen.rs"]
+#[expect(dead_code, reason = "another part of it is for the tests of the monitor")]
+mod screen;
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use bowden_core::recording::Recording;
+use bowden_model::channel::Channel;
 use common::bowden;
+use screen::Screen;
 
 /// Subcommands, by what the help lists.
 fn subcommands() -> Vec<String> {
@@ -95,6 +101,15 @@ fn facts_of_a_board_come_as_json() {
     assert!(parameters.as_array().unwrap().len() > 90);
     let one = json(&["params", "--port", "sim", "get", "supervisor.host_timeout", "--json"]);
     assert_eq!((&one[0]["value"], &one[0]["unit"]), (&0.5.into(), &"s".into()));
+    let status = json(&["send", "--port", "sim", "status", "--json"]);
+    assert_eq!(
+        (&status["state"], &status["fault"], &status["samples_lost"]),
+        (&"off".into(), &serde_json::Value::Null, &0.into())
+    );
+    assert_eq!(json(&["params", "--port", "sim", "table", "--json"]), serde_json::Value::Null);
+    let (status, _, stderr) =
+        bowden(folder.path(), &["params", "--port", "sim", "table", "--clear", "--json"]);
+    assert_eq!((status, stderr.lines().count()), (2, 1), "{stderr}");
     let faults = json(&["faults", "--port", "sim", "--json"]);
     assert_eq!(
         (&faults["state"], &faults["fault"], &faults["board"]),
@@ -113,4 +128,29 @@ fn nothing_is_coloured_in_a_pipe() {
         let (_, stdout, stderr) = bowden(folder.path(), arguments);
         assert!(!stdout.contains('\u{1b}') && !stderr.contains('\u{1b}'), "{arguments:?}");
     }
+}
+
+/// A bar while work goes on, and nothing of it left on the screen behind it.
+#[test]
+fn long_work_shows_a_bar_on_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let t_s: Vec<f64> = (0..400_000).map(|row| f64::from(row) * 1e-4).collect();
+    let values = t_s.iter().map(|t_s| (3.0 * t_s).sin()).collect();
+    let recording = Recording::new("made", t_s).with(Channel::F1, values);
+    recording.save(&folder.path().join("a.csv")).unwrap();
+    let shown = |arguments: &[&str], stage: &str| {
+        // The screen takes standard output alone; progress is on standard error.
+        let mut command = Command::new("sh");
+        command.current_dir(folder.path()).args(["-c", "exec \"$@\" 2>&1", "sh"]);
+        command.arg(env!("CARGO_BIN_EXE_bowden")).args(arguments);
+        let mut screen = Screen::start(&command, 100, 30);
+        screen.wait_for(stage);
+        let (status, _) = screen.end();
+        assert_eq!(status, 0, "{}", screen.text());
+        assert!(!screen.text().contains(stage), "{}", screen.text());
+    };
+    shown(&["convert", "a.csv", "a.mcap"], "converting");
+    shown(&["recover", "a.csv", "--out", "b.mcap"], "recovering");
+    shown(&["info", "a.csv"], "reading");
+    shown(&["check", "a.csv"], "reading");
 }

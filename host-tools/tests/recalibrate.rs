@@ -138,6 +138,22 @@ fn the_command_writes_a_rig_that_loads_and_says_what_is_unknown() {
     assert_eq!((status, stderr.as_str()), (0, ""));
     assert!(stdout.contains("  sheath.friction_coefficient * sheath.wrap_angle_rad\n"), "{stdout}");
     let fitted = fs::read_to_string(at.join("fitted.toml")).unwrap();
+    let (_, json, _) = bowden(at, &["fit", "rec.csv", "--rig", "rig.toml", "--out", "again.toml", "--json"]);
+    assert_eq!(fs::read_to_string(at.join("again.toml")).unwrap(), fitted);
+    let facts: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let of_group: Vec<&str> = facts["indistinguishable"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|group| group.as_array().unwrap())
+        .map(|member| member[0].as_str().unwrap())
+        .collect();
+    assert!(of_group.contains(&"sheath.wrap_angle_rad"), "{json}");
+    // What is printed as a table is what stands in the object.
+    let rows = stdout.lines().skip(1).take_while(|line| !line.is_empty()).count();
+    assert_eq!(facts["parameters"].as_array().unwrap().len(), rows, "{json}");
+    let fitted_n = &facts["parameters"].as_array().unwrap()[0];
+    assert!(stdout.contains(&fitted_n["fitted"].to_string()), "{fitted_n} {stdout}");
     assert!(fitted.starts_with("# of the lab\n"), "{fitted}");
     let fitted = Rig::load(&at.join("fitted.toml")).unwrap();
     assert_ne!(fitted.joint.sheath, rig().joint.sheath);

@@ -10,6 +10,7 @@ use bowden_core::study::{LoadedStudy, Role, Study};
 
 use super::{load_study, outcome_of, print, print_json};
 use crate::facts::Facts;
+use crate::progress::under_way;
 
 /// Arguments of `bowden check`.
 #[derive(Clone, Debug, clap::Args)]
@@ -30,7 +31,7 @@ impl CheckArguments {
     ///
     /// # Errors
     /// What makes a file unusable.
-    pub fn run(&self) -> Result<Outcome, Failure> {
+    pub fn run(&self, quiet: bool) -> Result<Outcome, Failure> {
         if let [only] = &self.recordings[..]
             && LoadedStudy::is_named_by(only)
         {
@@ -40,7 +41,8 @@ impl CheckArguments {
                     only.display()
                 )));
             }
-            let LoadedStudy { study, .. } = load_study(&self.recordings, self.rig.as_deref(), &[])?;
+            let read = || load_study(&self.recordings, self.rig.as_deref(), &[]);
+            let LoadedStudy { study, .. } = under_way(quiet, "reading", read)?;
             print(&describe_study(only, &study)?)?;
             return Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)));
         }
@@ -54,10 +56,10 @@ impl CheckArguments {
         let mut outcome = Outcome::done();
         let mut all = Vec::new();
         for path in &self.recordings {
-            let recording = match &rig {
-                Some(rig) => rig.load_recording(path)?,
-                None => Recording::load(path, &ReadOptions::default())?,
-            };
+            let recording = under_way(quiet, "reading", || match &rig {
+                Some(rig) => rig.load_recording(path),
+                None => Recording::load(path, &ReadOptions::default()),
+            })?;
             let _ = writeln!(text, "{}", describe(&recording));
             if let Some(rig) = &rig {
                 let roles = rig.roles(&recording)?;

@@ -35,6 +35,20 @@ pub struct FaultsArguments {
 /// What a board says of itself.
 #[derive(Serialize)]
 struct Facts<'f> {
+    #[serde(flatten)]
+    status: StatusFacts,
+    firmware: &'f str,
+    firmware_revision: &'f str,
+    board: &'f str,
+    board_serial: &'f str,
+    started_by: &'static str,
+    clock: String,
+    panic: &'f str,
+}
+
+/// State, fault, limits and counters, and how many of the last ticks are kept.
+#[derive(Serialize)]
+pub(super) struct StatusFacts {
     state: String,
     fault: Option<FaultFacts>,
     limits: Vec<&'static str>,
@@ -43,14 +57,25 @@ struct Facts<'f> {
     longest_tick_cycles: u32,
     samples_lost: u32,
     unreadable_frames: u32,
-    firmware: &'f str,
-    firmware_revision: &'f str,
-    board: &'f str,
-    board_serial: &'f str,
-    started_by: &'static str,
-    clock: String,
-    panic: &'f str,
+    failed_encoder_exchanges: u32,
     snapshot: u8,
+}
+
+impl From<&Status> for StatusFacts {
+    fn from(status: &Status) -> Self {
+        Self {
+            state: status.state.to_string(),
+            fault: status.fault.map(FaultFacts::from),
+            limits: acting(status),
+            tick: status.tick,
+            period_ns: status.period_ns,
+            longest_tick_cycles: status.longest_tick_cycles,
+            samples_lost: status.lost,
+            unreadable_frames: status.bad_frames,
+            failed_encoder_exchanges: status.bus_errors,
+            snapshot: status.snapshot,
+        }
+    }
 }
 
 /// A fault in numbers and words.
@@ -117,14 +142,7 @@ impl FaultsArguments {
         }
         if self.json {
             print_json(&Facts {
-                state: status.state.to_string(),
-                fault: status.fault.map(FaultFacts::from),
-                limits: acting(&status),
-                tick: status.tick,
-                period_ns: status.period_ns,
-                longest_tick_cycles: status.longest_tick_cycles,
-                samples_lost: status.lost,
-                unreadable_frames: status.bad_frames,
+                status: StatusFacts::from(&status),
                 firmware: &greeting.firmware,
                 firmware_revision: &greeting.revision,
                 board: &greeting.board,
@@ -132,7 +150,6 @@ impl FaultsArguments {
                 started_by: boot,
                 clock,
                 panic: &panic,
-                snapshot: status.snapshot,
             })?;
             return Ok(outcome);
         }

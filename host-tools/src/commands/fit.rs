@@ -9,8 +9,9 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
 use bowden_core::study::{LoadedStudy, Study};
+use serde::Serialize;
 
-use super::{all_paths, load_study, outcome_of, print};
+use super::{all_paths, load_study, outcome_of, print, print_json};
 
 /// Arguments of `bowden fit`.
 #[derive(Clone, Debug, clap::Args)]
@@ -25,6 +26,65 @@ pub struct FitArguments {
     /// rig.fitted.BENCH.toml of each bench
     #[arg(long, value_name = "FITTED.toml")]
     out: PathBuf,
+    /// Print JSON: one object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a fit found.
+#[derive(Serialize)]
+struct Facts<'f> {
+    parameters: Vec<ParameterFacts<'f>>,
+    /// RMS differences between recording and replay.
+    channels: Vec<ChannelFacts>,
+    /// Parameters of which the recordings show the product only, `section.name` and exponent.
+    indistinguishable: Vec<&'f [(String, f64)]>,
+    /// Parameters on which the recordings say nothing.
+    unseen: &'f [String],
+}
+
+#[derive(Serialize)]
+struct ParameterFacts<'f> {
+    parameter: String,
+    /// Bench that has it for itself.
+    bench: Option<&'f str>,
+    nominal: f64,
+    fitted: f64,
+    std: Option<f64>,
+    at_bound: bool,
+    unit: &'static str,
+}
+
+#[derive(Serialize)]
+struct ChannelFacts {
+    channel: &'static str,
+    nominal_rms: f64,
+    fitted_rms: f64,
+    unit: &'static str,
+}
+
+impl<'f> Facts<'f> {
+    fn of(result: &'f Recalibration, study: &'f Study) -> Self {
+        let parameters = result.parameters.iter().map(|fitted| ParameterFacts {
+            parameter: fitted.parameter.to_string(),
+            bench: fitted.bench.map(|bench| study.benches[bench].name.as_str()),
+            nominal: fitted.nominal,
+            fitted: fitted.fitted,
+            std: fitted.std,
+            at_bound: fitted.at_bound,
+            unit: fitted.unit,
+        });
+        let channels = result.channels.iter().map(|error| {
+            let (channel, unit) = named(error.series);
+            ChannelFacts { channel, nominal_rms: error.before, fitted_rms: error.after, unit }
+        });
+        Self {
+            parameters: parameters.collect(),
+            channels: channels.collect(),
+            indistinguishable: result.groups.iter().map(|group| group.members.as_slice()).collect(),
+            unseen: &result.unseen,
+        }
+    }
 }
 
 /// What a fit works on, checked.
@@ -48,7 +108,11 @@ impl FitArguments {
             result.write_to(bench, document)?;
             document.save(out)?;
         }
-        print(&table(&result, &study))?;
+        if self.json {
+            print_json(&Facts::of(&result, &study))?;
+        } else {
+            print(&table(&result, &study))?;
+        }
         Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)))
     }
 
@@ -89,10 +153,7 @@ fn table(result: &Recalibration, study: &Study) -> String {
     }
     let _ = writeln!(text, "\n{:<32}{:>12}  {:>12}   {:<14}unit", "RMS difference", "nominal", "fitted", "");
     for channel in &result.channels {
-        let (name, unit) = match channel.series {
-            Series::Channel(channel) => (channel.role(), channel.unit()),
-            Series::Guide => ("torque missing at the motor", "N m"),
-        };
+        let (name, unit) = named(channel.series);
         let _ =
             writeln!(text, "{name:<32}{:>12.4}  {:>12.4}   {:<14}{unit}", channel.before, channel.after, "");
     }
@@ -106,6 +167,14 @@ fn table(result: &Recalibration, study: &Study) -> String {
         let _ = writeln!(text, "\nThe recordings say nothing on {}.", result.unseen.join(", "));
     }
     text
+}
+
+/// Name and unit of a channel.
+fn named(series: Series) -> (&'static str, &'static str) {
+    match series {
+        Series::Channel(channel) => (channel.role(), channel.unit()),
+        Series::Guide => ("torque missing at the motor", "N m"),
+    }
 }
 
 fn row(parameter: &FittedParameter, study: &Study) -> String {

@@ -11,6 +11,7 @@ use bowden_host_link::firmware_log::LogDecoder;
 use bowden_host_link::firmware_log::import::LoggedRun;
 
 use super::log::{each_piece, load_image};
+use crate::progress::under_way;
 
 /// Arguments of `bowden import`.
 #[derive(Clone, Debug, clap::Args)]
@@ -38,15 +39,17 @@ impl ImportArguments {
     ///
     /// # Errors
     /// Exit status 2: unusable files, the ELF of another firmware, a log without time or numbers; 1, if the medium refuses.
-    pub fn run(&self) -> Result<Outcome, Failure> {
+    pub fn run(&self, quiet: bool) -> Result<Outcome, Failure> {
         let format = Format::for_rows(&self.out)?;
         output::check_file(&self.out, &[&self.log, &self.defmt])?;
         let image = load_image(&self.defmt)?;
         let mut decoder = LogDecoder::new(&image);
         let mut lines = Vec::new();
-        each_piece(&self.log, |bytes| {
-            lines.append(&mut decoder.take(bytes)?);
-            Ok(())
+        under_way(quiet, "decoding", || {
+            each_piece(&self.log, |bytes| {
+                lines.append(&mut decoder.take(bytes)?);
+                Ok(())
+            })
         })?;
         let log = self.log.display().to_string();
         let mut outcome = Outcome::done();

@@ -9,6 +9,7 @@ use bowden_model::channel::Channel;
 use super::{outcome_of, print, print_json};
 use crate::chart::chart;
 use crate::facts::{Facts, numbers};
+use crate::progress::under_way;
 
 /// Arguments of `bowden info`.
 #[derive(Clone, Debug, clap::Args)]
@@ -29,11 +30,12 @@ impl InfoArguments {
     ///
     /// # Errors
     /// What makes a file unusable; a column that is not there or holds text.
-    pub fn run(&self) -> Result<Outcome, Failure> {
+    pub fn run(&self, quiet: bool) -> Result<Outcome, Failure> {
         let mut outcome = Outcome::done();
         let mut all = Vec::new();
         for path in &self.recordings {
-            let recording = Recording::load(path, &ReadOptions::default())?;
+            let read = || Recording::load(path, &ReadOptions::default());
+            let recording = under_way(quiet, "reading", read)?;
             outcome.extend(outcome_of([&recording]).notes());
             let facts = Facts::of(&recording, path);
             if !self.json {

@@ -27,7 +27,7 @@ use super::{print, print_json};
 pub struct ParamsArguments {
     #[command(flatten)]
     port: PortArguments,
-    /// Print JSON: `list` and `get` one array, one object a parameter
+    /// Print JSON: `list` and `get` one array, one object a parameter; `table` one object, or null
     #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]
@@ -114,8 +114,15 @@ impl ParamsArguments {
     /// # Errors
     /// Exit status 2, if a name, value, file or the port is not usable; 1, if the board refused or the link broke.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        if self.json && !matches!(self.action, None | Some(Action::List | Action::Get { .. })) {
-            return Err(Failure::bad_input("--json: only `list` and `get` print facts; leave it out"));
+        let tells = match &self.action {
+            None | Some(Action::List | Action::Get { .. }) => true,
+            Some(Action::Table(table)) => table.only_shows(),
+            _ => false,
+        };
+        if self.json && !tells {
+            return Err(Failure::bad_input(
+                "--json: only `list`, `get` and `table` by itself print facts; leave it out",
+            ));
         }
         match &self.action {
             Some(Action::Save { file }) => output::check_file(file, &[])?,
@@ -145,7 +152,7 @@ impl ParamsArguments {
                 let text = parameters.to_toml();
                 output::write_file(file, |file| file.write_all(text.as_bytes()))?;
             }
-            Action::Table(table) => table.run(&mut client, &parameters)?,
+            Action::Table(table) => table.run(&mut client, &parameters, self.json)?,
             Action::Store => client.store_parameters()?,
             Action::Default => client.default_parameters()?,
         }

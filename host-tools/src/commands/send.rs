@@ -9,8 +9,9 @@ use bowden_host_link::session::{RunEnd, RunTick, Session};
 use bowden_link::Limit;
 
 use super::course::{CourseArguments, run_seconds};
+use super::faults::{StatusFacts, describe};
 use super::port::PortArguments;
-use super::print;
+use super::{print, print_json};
 use crate::interrupt;
 
 /// Arguments of `bowden send`.
@@ -45,7 +46,11 @@ enum Action {
         seconds: Option<f64>,
     },
     /// Print state, fault, limits and counters
-    Status,
+    Status {
+        /// Print JSON: one object
+        #[arg(long)]
+        json: bool,
+    },
     /// From off or fault: leave the firmware for the processor's own boot loader, which takes a new image over USB
     BootLoader,
 }
@@ -62,9 +67,13 @@ impl SendArguments {
     pub fn run(&self) -> Result<Outcome, Failure> {
         interrupt::catch()?;
         let stop = &interrupt::requested;
-        if let Action::Status = self.action {
+        if let Action::Status { json } = self.action {
             let status = self.port.connect()?.status()?;
-            print(&super::faults::describe(&status))?;
+            if json {
+                print_json(&StatusFacts::from(&status))?;
+            } else {
+                print(&describe(&status))?;
+            }
             return Ok(Outcome::done());
         }
         if let Action::Run { course, seconds } = &self.action {

@@ -145,12 +145,18 @@ fn one_flipped_byte_in_the_middle_of_200_000_rows_costs_one_chunk() {
     let (status, stdout, stderr) = bowden(place, &["convert", "b.mcap", "b.csv"]);
     assert_eq!((status, stdout.as_str()), (2, ""));
     assert!(stderr.contains("take out what is whole with `bowden recover`"), "{stderr}");
-    let (status, _, stderr) = bowden(place, &["recover", "b.mcap", "--out", "b.csv"]);
+    let (status, facts, stderr) = bowden(place, &["recover", "b.mcap", "--out", "b.csv", "--json"]);
     assert_eq!((status, stderr.lines().count()), (3, 1), "{stderr}");
+    let facts: serde_json::Value = serde_json::from_str(&facts).unwrap();
     let (whole, part) = (load(&place.join("a.mcap")), load(&place.join("b.csv")));
     let missing = whole.len() - part.len();
     // A chunk is a megabyte of messages of some 40 bytes and their heads of 31.
     assert!((5000..25_000).contains(&missing), "{missing}");
+    assert_eq!(
+        (&facts["rows"], &facts["span_s"]),
+        (&part.len().into(), &serde_json::json!([0.0, whole.t_s()[whole.len() - 1]]))
+    );
+    assert_eq!(facts["missing"].as_array().map(Vec::len), Some(1));
     assert!(stderr.contains(&format!(" are damaged: {missing} rows between t_s = ")), "{stderr}");
     let gap = part.t_s().windows(2).position(|pair| pair[1] - pair[0] > 1.5e-4).unwrap() + 1;
     assert_eq!(part.slice(0..gap), whole.slice(0..gap));

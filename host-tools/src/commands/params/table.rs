@@ -10,8 +10,9 @@ use bowden_core::output;
 use bowden_host_link::ripple_table::{Sampled, download, largest_nm, to_csv};
 use bowden_host_link::{Client, ParameterSet};
 use bowden_link::message::TableReport;
+use serde::Serialize;
 
-use super::super::print;
+use super::super::{print, print_json};
 
 /// Switch and limit of the table.
 const ENABLE: &str = "correction.ripple_table.enable";
@@ -47,6 +48,11 @@ fn period(text: &str) -> Result<f64, String> {
 }
 
 impl TableArguments {
+    /// Whether the board's table is shown, and nothing else done.
+    pub(super) fn only_shows(&self) -> bool {
+        self.file.is_none() && self.save.is_none() && !self.clear
+    }
+
     /// Checks what can be checked without a board.
     pub(super) fn check(&self) -> Result<(), Failure> {
         match &self.save {
@@ -56,7 +62,12 @@ impl TableArguments {
     }
 
     /// Does what the arguments say.
-    pub(super) fn run(&self, client: &mut Client, parameters: &ParameterSet) -> Result<(), Failure> {
+    pub(super) fn run(
+        &self,
+        client: &mut Client,
+        parameters: &ParameterSet,
+        json: bool,
+    ) -> Result<(), Failure> {
         if let Some(file) = &self.file {
             let sampled = Sampled::load(file, self.period.unwrap_or(TAU))?;
             let Sampled { table, rows, largest_error_nm } = &sampled;
@@ -84,6 +95,9 @@ impl TableArguments {
             }
         };
         match (&self.save, table) {
+            (None, table) if json => {
+                print_json(&table.as_ref().map(|table| Facts::of(table, parameters)).transpose()?)
+            }
             (None, None) => print("no ripple table\n"),
             (None, Some(table)) => print(&describe(&table, parameters)?),
             (Some(_), None) => Err(Failure::failed("the board has no ripple table; write one first")),
@@ -92,6 +106,34 @@ impl TableArguments {
                 output::write_file(file, |file| file.write_all(text.as_bytes()))
             }
         }
+    }
+}
+
+/// What the board's table is.
+#[derive(Serialize)]
+struct Facts {
+    points: usize,
+    period_rad: f32,
+    periods_per_turn: f64,
+    largest_nm: f64,
+    limit_nm: f64,
+    crc: u32,
+    /// It is switched on.
+    acts: bool,
+}
+
+impl Facts {
+    fn of(table: &RippleTable, parameters: &ParameterSet) -> Result<Self, Failure> {
+        let head = table.head();
+        Ok(Self {
+            points: table.points_raw().len(),
+            period_rad: head.period_rad,
+            periods_per_turn: TAU / f64::from(head.period_rad),
+            largest_nm: largest_nm(table),
+            limit_nm: parameters.value(LIMIT)?,
+            crc: head.crc,
+            acts: parameters.value(ENABLE)? == 1.0,
+        })
     }
 }
 
