@@ -21,6 +21,9 @@ use crate::usb::{PACKET, UsbDriver};
 const LOOK: Duration = Duration::from_millis(1);
 
 /// Answers on their way, with the number of their request.
+// Nobody but the thread uses it.
+#[expect(unsafe_code, reason = "a place for a variable")]
+#[unsafe(link_section = ".bss.ccm.answers")]
 pub static ANSWERS: Channel<CriticalSectionRawMutex, (u16, FromBoard), 4> = Channel::new();
 
 /// Sends answers and samples; `period_ns` is asked for at every batch.
