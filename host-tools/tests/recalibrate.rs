@@ -152,8 +152,13 @@ fn the_command_writes_a_rig_that_loads_and_says_what_is_unknown() {
     // What is printed as a table is what stands in the object.
     let rows = stdout.lines().skip(1).take_while(|line| !line.is_empty()).count();
     assert_eq!(facts["parameters"].as_array().unwrap().len(), rows, "{json}");
-    let fitted_n = &facts["parameters"].as_array().unwrap()[0];
-    assert!(stdout.contains(&fitted_n["fitted"].to_string()), "{fitted_n} {stdout}");
+    for (fact, row) in facts["parameters"].as_array().unwrap().iter().zip(stdout.lines().skip(1)) {
+        let words: Vec<&str> = row.split_whitespace().collect();
+        let number = |name: &str| fact[name].as_f64().unwrap();
+        let in_row = |word: &str| word.parse::<f64>().unwrap();
+        assert_eq!(fact["parameter"].as_str(), Some(words[0]));
+        assert_eq!([number("nominal"), number("fitted")], [in_row(words[1]), in_row(words[2])], "{row}");
+    }
     assert!(fitted.starts_with("# of the lab\n"), "{fitted}");
     let fitted = Rig::load(&at.join("fitted.toml")).unwrap();
     assert_ne!(fitted.joint.sheath, rig().joint.sheath);
