@@ -35,7 +35,11 @@ pub async fn run(port: Sender<'static, UsbDriver>, ends: SampleEnds) {
     loop {
         let said = select(ANSWERS.receive(), look.next()).await;
         let sent = match said {
-            Either::First((request, answer)) => line.say(Some(request), answer).await,
+            // A host that asks without a pause does not keep samples from their turn.
+            Either::First((request, answer)) => match line.say(Some(request), answer).await {
+                Ok(()) => source.pass_on(&mut line).await,
+                gone => gone,
+            },
             Either::Second(()) => source.pass_on(&mut line).await,
         };
         if sent.is_err() {
@@ -80,7 +84,7 @@ impl Source {
         for _ in 0..self.ends.samples.len() {
             if let Some(message) = self.next(mode) {
                 line.say(None, message).await?;
-                while let Ok((request, answer)) = ANSWERS.try_receive() {
+                if let Ok((request, answer)) = ANSWERS.try_receive() {
                     line.say(Some(request), answer).await?;
                 }
             }
