@@ -146,12 +146,11 @@ fn only_the_same_board_counts_as_back() {
     };
     let back = |boards, serial: Option<&str>| {
         let machine = Machine::new(|tenths| vec![plugged("own", "1-2"); usize::from(tenths > 0)], boards);
-        let board = match serial {
-            Some(_) => dfu::send(&machine, serial.map(str::to_owned), || Ok::<(), FlashError>(()), &Quiet),
-            None => {
-                machine.wait(Duration::from_millis(100));
-                dfu::open(&machine, None)
-            }
+        let board = if serial.is_some() {
+            dfu::send(&machine, serial.map(str::to_owned), || Ok::<(), FlashError>(()), &Quiet)
+        } else {
+            machine.wait(Duration::from_millis(100));
+            dfu::open(&machine, None)
         };
         (board.unwrap().await_firmware(&machine, &Quiet), machine.tenths.get())
     };
