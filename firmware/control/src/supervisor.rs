@@ -9,8 +9,7 @@
 //! | fault | off | self test | pretension check | ready | homing | run |
 //! |---|---|---|---|---|---|---|
 //! | encoder frames, jumps | | x | x | x | x | x |
-//! | encoder stuck, tension stuck, joint speed | | | | | x | x |
-//! | joint range, tracking error: position mode | | | | | | x |
+//! | encoder stuck | | | | | x | x |
 //! | tension at a rail | | x | x | x | x | x |
 //! | slack, over-tension, tensions that contradict each other or the stretch | | | | x | x | x |
 //! | over-current, bus voltage, bridge | | x | x | x | x | x |
