@@ -10,7 +10,7 @@ pub const NAMED_STRENGTH: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Starts {
     /// From the usual strength, from less and from more; where friction falls with speed, at several speeds; what happens at a moment,
-    /// at moments spread over the recordings.
+    /// at the moments that tell most of it.
     Usual,
     /// From strengths a third of an octave apart, up to two octaves from the usual one.
     ThirdsOfOctaves,

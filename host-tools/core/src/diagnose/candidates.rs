@@ -12,9 +12,6 @@ use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
 use crate::simulation::Prediction;
 
-/// Moments at which an effect with an onset is tried, spread over the recording.
-const ONSETS: usize = 12;
-
 /// Strengths, in typical ones, at which an effect is tried, and speeds at which friction falls.
 const STEADY: [f64; 3] = [0.4, 1.0, 2.5];
 
@@ -134,13 +131,14 @@ fn starts(
     }
 }
 
-/// At some strengths, or at some moments.
+/// At some strengths, or at a moment.
 fn usual_starts(base: ActiveEffect, objective: &Objective) -> Vec<ActiveEffect> {
     let parameters = base.descriptor().parameters;
     let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
     match (parameters.first(), onset) {
         (None, _) => vec![base],
-        (Some(_), Some(onset)) => onset_starts(base, onset, objective.duration_s()),
+        // Screening finds the moments that tell most.
+        (Some(_), Some(onset)) => vec![half_way(base, onset, objective.duration_s())],
         (Some(strength), None) => {
             // What has either sign goes nearly with its strength; screening finds the sign.
             let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &STEADY };
@@ -154,14 +152,9 @@ fn usual_starts(base: ActiveEffect, objective: &Objective) -> Vec<ActiveEffect> 
     }
 }
 
-/// At moments spread over the recordings; screening finds the sign.
-fn onset_starts(base: ActiveEffect, onset: &ParameterSpec, duration_s: f64) -> Vec<ActiveEffect> {
-    (0..ONSETS)
-        .map(|k| {
-            base.with(onset.name, duration_s * (k as f64 + 0.5) / ONSETS as f64)
-                .with("duration_s", duration_s / 6.0)
-        })
-        .collect()
+/// In the middle of the recordings.
+fn half_way(base: ActiveEffect, onset: &ParameterSpec, duration_s: f64) -> ActiveEffect {
+    base.with(onset.name, 0.5 * duration_s).with("duration_s", duration_s / 6.0)
 }
 
 /// The given strengths; where friction falls with speed, the speed matters as much as the strength.

@@ -10,17 +10,28 @@
 //! simulated again with the parameters where the slopes would put them, and once more from there if that was better. Those that
 //! rank first start from such parameters wherever they predict better.
 
+mod moments;
+
 use bowden_model::effect::{ActiveEffect, Component};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidates::Candidate;
 use super::layout::Layout;
-use crate::fit::objective::{Objective, Residuals};
+use crate::fit::free::is_moment;
+use crate::fit::objective::{Objective, Part, Residuals};
 use crate::fit::solver::{Solution, training_rows};
 use crate::joint_model::JointModel;
 use crate::progress::Progress;
 use crate::simulation::Prediction;
+use moments::{Change, Span};
+
+/// Times the length of the recordings before which something has set in that has always been there: what comes on in a tenth of its
+/// time is there then.
+const LONG_SINCE: f64 = 10.0;
+
+/// Part of its time in which something fades that ends.
+const FADES: f64 = 0.1;
 
 /// Candidates whose estimated strength is simulated, of those that the estimate ranks first.
 const VERIFIED: usize = 10;
@@ -110,7 +121,11 @@ pub fn screen(
     let judged: Vec<(usize, Option<Judged>)> = starts
         .par_iter()
         .map(|(candidate, start)| {
-            let judged = if progress.interrupted() { None } else { background.judge(*start) };
+            let judged = if progress.interrupted() {
+                None
+            } else {
+                background.judge_at_moments(*start).or_else(|| background.judge(*start))
+            };
             progress.advance(1);
             (*candidate, judged)
         })
@@ -155,6 +170,66 @@ struct Background<'a> {
 }
 
 impl Background<'_> {
+    /// An effect that sets in at a moment, at the best of the moments that tell most of it: what is simulated there says which, with
+    /// parameters that make room for it. `None` for one that has no moment, or whose moments tell nothing.
+    ///
+    /// A moment at which nothing happened is promised much too where the parameters have taken the place of the change, and no
+    /// simulation keeps that.
+    fn judge_at_moments(&self, base: ActiveEffect) -> Option<Judged> {
+        let judged = self.moments(base).into_iter().filter_map(|start| {
+            let mut judged = self.judge(start)?;
+            if judged.start.room.is_none() {
+                judged.start = self.with_room(judged.start);
+            }
+            let model = judged.start.room.as_ref().unwrap_or(&self.present.solution.model);
+            let there = self.beside(model, judged.start.start).filter(Residuals::is_finite)?;
+            Some((rows(self.objective, &there).norm_squared(), judged))
+        });
+        judged.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, judged)| judged)
+    }
+
+    /// Starts of an effect at the moments that tell most of it.
+    fn moments(&self, base: ActiveEffect) -> Vec<ActiveEffect> {
+        let descriptor = base.descriptor();
+        let onset = descriptor.parameters.iter().position(is_moment);
+        let (Some(onset), Some(neutral)) = (onset, descriptor.neutral) else { return Vec::new() };
+        let duration = descriptor.index_of("duration_s");
+        let total_s = self.objective.duration_s();
+        let lasting = |from_s: f64, lasts_s: f64| {
+            let mut effect = base;
+            effect.parameters[onset] = from_s;
+            if let Some(duration) = duration {
+                effect.parameters[duration] = lasts_s;
+            }
+            effect
+        };
+        let always = lasting(-LONG_SINCE * total_s, 2.0 * LONG_SINCE * total_s);
+        let Some(there) = self.residuals(always).filter(Residuals::is_finite) else { return Vec::new() };
+        let change = rows(self.objective, &there) - &self.rows_now;
+        let clock_s: Vec<f64> = self
+            .objective
+            .entries()
+            .filter(|entry| entry.block.part == Part::Training)
+            .map(|entry| self.objective.input(entry.recording).clock_at_s(entry.block.start))
+            .collect();
+        let end_s = clock_s.iter().copied().fold(0.0, f64::max);
+        let strength = descriptor.parameters[0];
+        let one = base.parameters[0] - neutral;
+        let limits = [strength.lower, strength.upper]
+            .map(|limit| ((limit - neutral) / one).clamp(-STRONGEST, STRONGEST));
+        let limits = [limits[0].min(limits[1]), limits[0].max(limits[1])];
+        let compared =
+            Change { clock_s: &clock_s, left: &self.now, change: &change, basis: &self.basis.q };
+        let started = |span: Span| {
+            // What lasts beyond the recordings must not fade before their end.
+            let until_s = if span.until_s.is_finite() { span.until_s } else { end_s + FADES * total_s };
+            let mut start = lasting(span.from_s, until_s - span.from_s);
+            start.parameters[0] = neutral + span.strength * one;
+            start
+        };
+        compared.spans(limits, duration.is_some()).into_iter().map(started).collect()
+    }
+
     fn judge(&self, start: ActiveEffect) -> Option<Judged> {
         let Self { objective, basis, now, .. } = self;
         let there = rows(objective, &self.residuals(start).filter(Residuals::is_finite)?);
@@ -400,6 +475,26 @@ mod tests {
         record(&model, start.with("gain", 1.9), &mut recording);
         let (found, _) = screened(&model, recording, &[], vec![start.with("gain", 1.1)]);
         assert!((found.start.parameters[0] - 1.9).abs() < 0.05, "{:?}", found.start.parameters[0]);
+    }
+
+    /// A fifth of the weight is taken off inside a second that is held out; the recalibration takes the weight that hangs most of the time.
+    #[test]
+    fn a_weight_that_was_taken_off_is_tried_at_its_moment() {
+        const TAKEN_OFF_S: f64 = 2.6;
+        let mut recording = test_bench::swung(12_000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let start = ActiveEffect::with_defaults(find("payload_change").unwrap());
+        record(&model, start.with("change_kg", -0.5).with("time_s", TAKEN_OFF_S), &mut recording);
+        let (found, present) = screened(&model, recording, &[COARSE_STEP, FINE_STEP], vec![start]);
+        let mass_kg = |model: &JointModel| model.parameters.load.unwrap().mass_kg;
+        let (believed, taken) = (mass_kg(&model), mass_kg(&present));
+        assert!(taken < 0.9 * believed, "{taken} kg taken for {believed} kg");
+        let [change_kg, time_s, ..] = found.start.parameters;
+        assert!((time_s - TAKEN_OFF_S).abs() < 0.5, "{time_s} s");
+        assert!((change_kg / -0.5 - 1.0).abs() < 0.5, "{change_kg} kg");
+        assert!(found.gain > 0.5, "{}", found.gain);
+        let room = mass_kg(&found.room.expect("room"));
+        assert!((room - believed).abs() < (taken - believed).abs() / 2.0, "{room} kg for {believed} kg");
     }
 
     /// A spring whose torque the recalibration took for that of half as much weight again.

@@ -131,7 +131,8 @@ impl ReplayInput {
     }
 
     /// Clock of the bench at sample `k`, s.
-    pub(super) fn clock_at_s(&self, k: usize) -> f64 {
+    #[must_use]
+    pub fn clock_at_s(&self, k: usize) -> f64 {
         self.clock_offset_s + self.t_s[k]
     }
 
