@@ -218,8 +218,7 @@ impl Background<'_> {
         let limits = [strength.lower, strength.upper]
             .map(|limit| ((limit - neutral) / one).clamp(-STRONGEST, STRONGEST));
         let limits = [limits[0].min(limits[1]), limits[0].max(limits[1])];
-        let compared =
-            Change { clock_s: &clock_s, left: &self.now, change: &change, basis: &self.basis.q };
+        let compared = Change { clock_s: &clock_s, left: &self.now, change: &change, basis: &self.basis.q };
         let started = |span: Span| {
             // What lasts beyond the recordings must not fade before their end.
             let until_s = if span.until_s.is_finite() { span.until_s } else { end_s + FADES * total_s };

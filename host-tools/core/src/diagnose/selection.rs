@@ -1,6 +1,8 @@
 //! Which effects the data ask for: forward, the best candidate at a time, by what it takes off the loss of all that is fitted; then
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 //!
+//! A wrong sensor whose own channel changes as some parameter changes it must take off as much as a law.
+//!
 //! What is held out takes no part. That a fit sees what it is chosen by costs little: an effect has two or three parameters, and of
 //! hundreds of residuals that know nothing of each other they take off a hundredth, where a name must take off 15 % and a law 30 %
 //! ([`POLICY`]), and that also without the tenth of the seconds that speak most for it.
@@ -11,6 +13,7 @@ mod exchange;
 mod hypotheses;
 mod laws;
 mod loudest;
+mod own_channel;
 mod repeating;
 mod trying;
 
@@ -383,7 +386,9 @@ impl Search<'_> {
             let Some((chosen, with, without)) = self.best_showing(before, present, &mut fits, worth)? else {
                 return Ok(None);
             };
-            if self.holds_across_recordings(without, &with, |a, b| worth(&POLICY, a, b))? {
+            if self.is_no_parameter(without, &with)?
+                && self.holds_across_recordings(without, &with, |a, b| worth(&POLICY, a, b))?
+            {
                 return Ok(Some((chosen, with)));
             }
         }

@@ -1,0 +1,90 @@
+//! Whether what a sensor has recorded can tell that the sensor is wrong, and not that a parameter is.
+//!
+//! What is missing elsewhere bends parameters, and a sensor that is said to be wrong can pay what that costs in its own channel. The
+//! current of a motor whose angle is prescribed is `(V - k_t ω) / R`: another gain is another `R` and `k_t`, and only torques, with all
+//! friction that they contain, tell them apart. Play of a joint draws the resistance down by a tenth, and a gain of 0.91 takes back what
+//! that does to the current, which is right by the rig file.
+
+use bowden_model::effect::{ActiveEffect, Component};
+use nalgebra::{DMatrix, DVector};
+
+use super::{Fitted, Search};
+use crate::diagnose::policy::POLICY;
+use crate::fit::objective::{Part, Residuals, Series, soft};
+use crate::fit::solver::Solution;
+use crate::joint_model::JointModel;
+use crate::outcome::Failure;
+
+/// Singular value, over the largest, below which a direction of the parameters changes nothing.
+const SMALLEST: f64 = 1e-9;
+
+impl Search<'_> {
+    /// Whether the newest effect of `with` is told from the parameters: true for what is no effect of a sensor, for one that changes its
+    /// own channel in a way in which no parameter does, by as much as a name must take off, and for one that takes off as much as a law must.
+    pub(super) fn is_no_parameter(&self, without: &Fitted, with: &Fitted) -> Result<bool, Failure> {
+        let effect = with.newest();
+        let told = effect.descriptor().component != Component::Sensors
+            || POLICY.worth_stating(without.loss, with.loss)
+            || self.progress.interrupted();
+        Ok(told || self.own_change(with, &effect)?.is_none_or(|own| own > POLICY.name_loss))
+    }
+
+    /// Mean, in squared scales, of what `effect`, the newest of `with`, changes in its own channel and recalibrated parameters cannot change
+    /// alike; `None` where the channel drives the replay.
+    fn own_change(&self, with: &Fitted, effect: &ActiveEffect) -> Result<Option<f64>, Failure> {
+        let Solution { model, residuals, jacobian, .. } = &with.solution;
+        let [objective, _] = &self.objective.split();
+        let is_of_sensor =
+            |series| matches!(series, Series::Channel(channel) if effect.target.includes(channel));
+        // Places among the rows of the slopes and among all residuals.
+        let own: Vec<(usize, usize)> = objective
+            .entries()
+            .enumerate()
+            .filter(|(_, entry)| entry.block.part == Part::Training)
+            .enumerate()
+            .filter(|(_, (_, entry))| is_of_sensor(entry.series))
+            .map(|(row, (place, _))| (row, place))
+            .collect();
+        if own.is_empty() {
+            return Ok(None);
+        }
+        let effects = model.effects[..model.effects.len() - 1].to_vec();
+        let right = objective.residuals(&JointModel { effects, ..model.clone() })?;
+        let softly = |residuals: &Residuals, place: usize| soft(residuals.values[place]);
+        let change = own.iter().map(|(_, place)| softly(residuals, *place) - softly(&right, *place));
+        let change = DVector::from_iterator(own.len(), change);
+        let rows: Vec<usize> = own.iter().map(|(row, _)| *row).collect();
+        let parameters = with.layout.calibrated(model).len();
+        let slopes = jacobian.columns(0, parameters.min(jacobian.ncols())).select_rows(&rows);
+        Ok(Some(left_by(slopes, &change).norm_squared() / own.len() as f64))
+    }
+}
+
+/// The part of `change` that no combination of the columns of `slopes` makes.
+fn left_by(slopes: DMatrix<f64>, change: &DVector<f64>) -> DVector<f64> {
+    if slopes.ncols() == 0 {
+        return change.clone();
+    }
+    let decomposed = slopes.clone().svd(true, true);
+    let smallest = SMALLEST * decomposed.singular_values.max();
+    decomposed.solve(change, smallest).map_or_else(|_| change.clone(), |steps| change - slopes * steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: of (3, 4, 12) the first two are a combination of (1, 0, 0) and (1, 1, 0), whichever scale these have.
+    #[test]
+    fn what_parameters_change_alike_is_nothing_of_its_own() {
+        let slopes = DMatrix::from_columns(&[
+            DVector::from_vec(vec![1.0, 0.0, 0.0]),
+            DVector::from_vec(vec![1e-3, 1e-3, 0.0]),
+        ]);
+        let change = DVector::from_vec(vec![3.0, 4.0, 12.0]);
+        assert!((left_by(slopes.clone(), &change) - DVector::from_vec(vec![0.0, 0.0, 12.0])).norm() < 1e-9);
+        let twice_the_same = slopes.select_columns(&[0, 1, 0]);
+        assert!((left_by(twice_the_same, &change).norm() - 12.0).abs() < 1e-9);
+        assert_eq!(left_by(DMatrix::zeros(3, 0), &change), change);
+    }
+}
