@@ -24,7 +24,7 @@ use crate::fit::solver::{Solution, training_rows};
 use crate::joint_model::JointModel;
 use crate::progress::Progress;
 use crate::simulation::Prediction;
-use moments::{Change, Span};
+use moments::{Comparison, Span};
 
 /// Times the length of the recordings before which something has set in that has always been there: what comes on in a tenth of its
 /// time is there then.
@@ -218,7 +218,8 @@ impl Background<'_> {
         let limits = [strength.lower, strength.upper]
             .map(|limit| ((limit - neutral) / one).clamp(-STRONGEST, STRONGEST));
         let limits = [limits[0].min(limits[1]), limits[0].max(limits[1])];
-        let compared = Change { clock_s: &clock_s, left: &self.now, change: &change, basis: &self.basis.q };
+        let compared =
+            Comparison { clock_s: &clock_s, left: &self.now, change: &change, basis: &self.basis.q };
         let started = |span: Span| {
             // What lasts beyond the recordings must not fade before their end.
             let until_s = if span.until_s.is_finite() { span.until_s } else { end_s + FADES * total_s };

@@ -21,7 +21,7 @@ const APART: f64 = 1.0 / 12.0;
 const LEFT_BY_PARAMETERS: f64 = 1e-6;
 
 /// What is compared with what, row by row.
-pub(super) struct Change<'a> {
+pub(super) struct Comparison<'a> {
     /// Clock of the bench in the middle of the block of each row, s.
     pub clock_s: &'a [f64],
     /// Part of the residuals that no parameter takes off.
@@ -54,7 +54,7 @@ struct Sums {
     inside: DVector<f64>,
 }
 
-impl Change<'_> {
+impl Comparison<'_> {
     /// The best moments for strengths in `[lower, upper]`, best first; with `ends`, the best spans.
     pub(super) fn spans(&self, [lower, upper]: [f64; 2], ends: bool) -> Vec<Span> {
         let sums = self.sums();
@@ -154,7 +154,7 @@ mod tests {
     fn found(made: &DVector<f64>, limits: [f64; 2], ends: bool) -> Vec<Span> {
         let (left, basis) = left(made);
         let (clock_s, change) = (clock_s(), change());
-        Change { clock_s: &clock_s, left: &left, change: &change, basis: &basis }.spans(limits, ends)
+        Comparison { clock_s: &clock_s, left: &left, change: &change, basis: &basis }.spans(limits, ends)
     }
 
     /// The residuals are what is missing: the effect at half of its strength takes them off.
@@ -200,7 +200,7 @@ mod tests {
         assert!(all_along.iter().all(|span| span.gain < 1e-20), "{all_along:?}");
         let nothing = DVector::zeros(0);
         let basis = DMatrix::zeros(0, 0);
-        let none = Change { clock_s: &[], left: &nothing, change: &nothing, basis: &basis };
+        let none = Comparison { clock_s: &[], left: &nothing, change: &nothing, basis: &basis };
         assert_eq!(none.spans([-3.0, 3.0], true), []);
     }
 
@@ -211,7 +211,7 @@ mod tests {
         let (left, basis) = left(&made);
         let order: Vec<usize> = (0..ROWS).map(|row| row * 7 % ROWS).collect();
         let of = |values: &DVector<f64>| DVector::from_iterator(ROWS, order.iter().map(|row| values[*row]));
-        let shuffled = Change {
+        let shuffled = Comparison {
             clock_s: &order.iter().map(|row| clock_s[*row]).collect::<Vec<f64>>(),
             left: &of(&left),
             change: &of(&change),
