@@ -47,11 +47,15 @@ fn what_only_the_coarse_search_needs_is_not_named() {
     assert_eq!(named(&diagnosis), ["sheath_viscous_friction"], "{}", diagnosis["summary"]);
 }
 
-/// Half of a clear fault: a whole one slackens a tendon in this motion, and the board stops.
+/// Half of a clear fault: a whole one slackens a tendon in this motion, and the board stops. Beside the noise of the second seed a gain of
+/// the motor current fits too, though the resistance does as well in its place.
 #[test]
 fn play_of_the_joint_is_found_in_a_fast_motion() {
-    let diagnosis = diagnosed("joint_backlash:0.5,seed=712", ["multisine", "0.4", "0.25"], "16");
-    assert_eq!(named(&diagnosis), ["joint_backlash"], "{}", diagnosis["summary"]);
+    for seed in [712, 714] {
+        let rig = format!("joint_backlash:0.5,seed={seed}");
+        let diagnosis = diagnosed(&rig, ["multisine", "0.4", "0.25"], "16");
+        assert_eq!(named(&diagnosis), ["joint_backlash"], "seed {seed}: {}", diagnosis["summary"]);
+    }
 }
 
 /// The virtual bench bends its sheaths between 14 % and 86 % of their length. Each step of a staircase leaves the arm ringing on the free

@@ -2,11 +2,12 @@
 //! looked for.
 
 use bowden_model::channel::Channel;
-use bowden_model::effect::{ActiveEffect, Component, Effect, ParameterSpec, Target};
+use bowden_model::effect::{ActiveEffect, Component, Effect, Target};
 use bowden_model::effects::CATALOGUE;
 use bowden_model::search::Starts;
 
 use super::locked::locked_start;
+use super::onset::moment_of;
 use crate::fit::objective::{Objective, Series};
 use crate::fit::typical::sized;
 use crate::joint_model::JointModel;
@@ -134,11 +135,10 @@ fn starts(
 /// At some strengths, or at a moment.
 fn usual_starts(base: ActiveEffect, objective: &Objective) -> Vec<ActiveEffect> {
     let parameters = base.descriptor().parameters;
-    let onset = parameters.iter().find(|spec| spec.name == "time_s" || spec.name == "start_s");
-    match (parameters.first(), onset) {
+    match (parameters.first(), moment_of(&base)) {
         (None, _) => vec![base],
         // Screening finds the moments that tell most.
-        (Some(_), Some(onset)) => vec![half_way(base, onset, objective.duration_s())],
+        (Some(_), Some(moment)) => vec![half_way(base, moment, objective.duration_s())],
         (Some(strength), None) => {
             // What has either sign goes nearly with its strength; screening finds the sign.
             let factors: &[f64] = if strength.lower < 0.0 { &[1.0] } else { &STEADY };
@@ -153,8 +153,9 @@ fn usual_starts(base: ActiveEffect, objective: &Objective) -> Vec<ActiveEffect> 
 }
 
 /// In the middle of the recordings.
-fn half_way(base: ActiveEffect, onset: &ParameterSpec, duration_s: f64) -> ActiveEffect {
-    base.with(onset.name, 0.5 * duration_s).with("duration_s", duration_s / 6.0)
+fn half_way(mut base: ActiveEffect, moment: usize, duration_s: f64) -> ActiveEffect {
+    base.parameters[moment] = 0.5 * duration_s;
+    base.with("duration_s", duration_s / 6.0)
 }
 
 /// The given strengths; where friction falls with speed, the speed matters as much as the strength.

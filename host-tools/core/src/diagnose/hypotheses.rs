@@ -189,17 +189,60 @@ fn sentence(tried: &TriedHypothesis) -> String {
         short(tried.heldout_loss)
     );
     let rivals = [
-        ("the best effect of the catalogue", &tried.catalogue),
-        ("the best closed form", &tried.closed_form),
-        ("the best free curve, over", &tried.free_curve),
+        ("the best effect of the catalogue", "", &tried.catalogue),
+        ("the best closed form", "", &tried.closed_form),
+        ("the best free curve", ", over", &tried.free_curve),
     ];
-    for (what, rival) in rivals {
+    for (what, over, rival) in rivals {
         // Writing to a String cannot fail.
         let _ = match rival {
-            Some(RivalLoss { id, heldout_loss }) => write!(text, "; {what} {id} to {}", short(*heldout_loss)),
+            Some(RivalLoss { id, heldout_loss }) => {
+                write!(text, "; {what}{over} {id} to {}", short(*heldout_loss))
+            }
             None => write!(text, "; {what} promises too little for a fit"),
         };
     }
     let end = if tried.found { "The diagnosed rig simulates it." } else { "It is not in the diagnosed rig." };
     format!("{text}. {end}")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    #[test]
+    fn a_rival_that_promises_nothing_is_said_to() {
+        let mut tried = TriedHypothesis {
+            name: "drag".to_owned(),
+            component: "load".to_owned(),
+            port: "joint".to_owned(),
+            variables: vec!["omega_rad_s".to_owned()],
+            channel: None,
+            coefficients: BTreeMap::new(),
+            heldout_loss_without: 5.0,
+            heldout_loss: 1.5,
+            catalogue: Some(RivalLoss { id: "joint_spring".to_owned(), heldout_loss: 4.0 }),
+            closed_form: None,
+            free_curve: None,
+            beats_catalogue: true,
+            beats_closed_form: true,
+            beats_free_curve: true,
+            found: false,
+            sentence: String::new(),
+        };
+        assert_eq!(
+            sentence(&tried),
+            "Beside the recalibrated rig, drag brings the held-out loss from 5.00 to 1.50; the best effect of the catalogue joint_spring to \
+             4.00; the best closed form promises too little for a fit; the best free curve promises too little for a fit. It is not in the \
+             diagnosed rig."
+        );
+        tried.free_curve = Some(RivalLoss { id: "theta_rad".to_owned(), heldout_loss: 2.0 });
+        assert!(
+            sentence(&tried).contains("; the best free curve, over theta_rad to 2.00."),
+            "{}",
+            sentence(&tried)
+        );
+    }
 }

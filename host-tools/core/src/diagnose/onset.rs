@@ -45,7 +45,8 @@ pub(super) fn between_recordings(
     Ok(true)
 }
 
-fn moment_of(effect: &ActiveEffect) -> Option<usize> {
+/// Place, among the parameters, of the moment at which `effect` sets in.
+pub(super) fn moment_of(effect: &ActiveEffect) -> Option<usize> {
     effect.descriptor().parameters.iter().position(is_moment)
 }
 

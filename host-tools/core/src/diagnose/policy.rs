@@ -67,6 +67,12 @@ impl Policy {
         before - after > self.name_loss && before - after > share * before
     }
 
+    /// Whether an effect is worth naming that its own channel does not tell from a parameter: it takes off the share of a law too.
+    #[must_use]
+    pub fn worth_naming_untold(&self, before: f64, after: f64) -> bool {
+        self.worth_naming(before, after) && before - after > self.law_share * before
+    }
+
     /// Whether so many further instances of an effect that has its name are worth having.
     #[must_use]
     pub fn worth_having(&self, before: f64, after: f64, instances: usize) -> bool {
@@ -148,6 +154,17 @@ mod tests {
         assert!(!POLICY.worth_having(10.0, 9.8, 1));
         // Four of them, 3 % each.
         assert!(!POLICY.worth_having(10.0, 9.0, 4) && POLICY.worth_having(10.0, 8.7, 4));
+    }
+
+    /// A weak fault that takes half of a small loss off is named, though no law is looked for there.
+    #[test]
+    fn what_its_own_channel_does_not_tell_takes_the_share_of_a_law_off() {
+        for (before, after, named) in
+            [(2.85, 2.3, false), (0.84, 0.38, true), (0.7, 0.35, true), (0.15, 0.08, false)]
+        {
+            assert_eq!(POLICY.worth_naming_untold(before, after), named, "{before} to {after}");
+        }
+        assert!(!POLICY.worth_stating(0.7, 0.35));
     }
 
     #[test]

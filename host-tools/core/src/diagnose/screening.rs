@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::candidates::Candidate;
 use super::layout::Layout;
-use crate::fit::free::is_moment;
+use super::onset::moment_of;
 use crate::fit::objective::{Objective, Part, Residuals};
 use crate::fit::solver::{Solution, training_rows};
 use crate::joint_model::JointModel;
@@ -150,7 +150,11 @@ pub fn screen(
                 }
                 _ => judged.best().clone(),
             };
-            if place < VERIFIED && best.room.is_none() { background.with_room(best) } else { best }
+            if place < VERIFIED && best.room.is_none() {
+                background.with_room(&best).map_or(best, |(with_room, _)| with_room)
+            } else {
+                best
+            }
         })
         .collect();
     screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -177,13 +181,9 @@ impl Background<'_> {
     /// simulation keeps that.
     fn judge_at_moments(&self, base: ActiveEffect) -> Option<Judged> {
         let judged = self.moments(base).into_iter().filter_map(|start| {
-            let mut judged = self.judge(start)?;
-            if judged.start.room.is_none() {
-                judged.start = self.with_room(judged.start);
-            }
-            let model = judged.start.room.as_ref().unwrap_or(&self.present.solution.model);
-            let there = self.beside(model, judged.start.start).filter(Residuals::is_finite)?;
-            Some((rows(self.objective, &there).norm_squared(), judged))
+            let judged = self.judge(start)?;
+            let (start, loss) = self.with_room(&judged.start)?;
+            Some((loss, Judged { start, ..judged }))
         });
         judged.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, judged)| judged)
     }
@@ -191,8 +191,7 @@ impl Background<'_> {
     /// Starts of an effect at the moments that tell most of it.
     fn moments(&self, base: ActiveEffect) -> Vec<ActiveEffect> {
         let descriptor = base.descriptor();
-        let onset = descriptor.parameters.iter().position(is_moment);
-        let (Some(onset), Some(neutral)) = (onset, descriptor.neutral) else { return Vec::new() };
+        let (Some(onset), Some(neutral)) = (moment_of(&base), descriptor.neutral) else { return Vec::new() };
         let duration = descriptor.index_of("duration_s");
         let total_s = self.objective.duration_s();
         let lasting = |from_s: f64, lasts_s: f64| {
@@ -302,11 +301,15 @@ impl Background<'_> {
         best
     }
 
-    /// The same start with parameters where the slopes of the present model put them beside it, or half-way there, where that
-    /// predicts better than the present ones: stick and slip leave the optimiser no way there in small steps.
-    fn with_room(&self, start: Screened) -> Screened {
-        let Some(here) = self.residuals(start.start).filter(Residuals::is_finite) else { return start };
-        let here = rows(self.objective, &here);
+    /// The same start, and its loss, with parameters where the slopes of the present model put them beside it, or half-way there, where
+    /// that predicts better than the present ones: stick and slip leave the optimiser no way there in small steps. A start that has
+    /// such parameters keeps them; `None` for one that cannot be simulated.
+    fn with_room(&self, start: &Screened) -> Option<(Screened, f64)> {
+        if let Some(room) = &start.room {
+            let there = self.beside(room, start.start).filter(Residuals::is_finite)?;
+            return Some((start.clone(), rows(self.objective, &there).norm_squared()));
+        }
+        let here = rows(self.objective, &self.residuals(start.start).filter(Residuals::is_finite)?);
         let mut x = -self.basis.steps(&self.basis.inside(&here));
         x.apply(|x| *x = x.clamp(-ROOM, ROOM));
         let moved = [1.0, 0.5].into_iter().filter_map(|part| {
@@ -315,8 +318,11 @@ impl Background<'_> {
             Some((rows(self.objective, &there).norm_squared(), room))
         });
         let best = moved.min_by(|(a, _), (b, _)| a.total_cmp(b));
-        let room = best.filter(|(loss, _)| *loss < here.norm_squared()).map(|(_, room)| room);
-        Screened { room, ..start }
+        let loss = here.norm_squared();
+        Some(match best.filter(|(moved, _)| *moved < loss) {
+            Some((loss, room)) => (Screened { room: Some(room), ..start.clone() }, loss),
+            None => (start.clone(), loss),
+        })
     }
 
     /// The present model with its parameters at `x`, in the optimiser's coordinates.

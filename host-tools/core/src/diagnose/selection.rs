@@ -1,7 +1,7 @@
 //! Which effects the data ask for: forward, the best candidate at a time, by what it takes off the loss of all that is fitted; then
 //! backward, each effect must still be worth its place beside what every bench has a little of.
 //!
-//! A wrong sensor whose own channel changes as some parameter changes it must take off as much as a law.
+//! A wrong sensor whose own channel changes as some parameter changes it must take off the share that a law must.
 //!
 //! What is held out takes no part. That a fit sees what it is chosen by costs little: an effect has two or three parameters, and of
 //! hundreds of residuals that know nothing of each other they take off a hundredth, where a name must take off 15 % and a law 30 %

@@ -3,8 +3,8 @@
 //! The effect is simulated once as if it had always been there. With what that changes, `d`, cut off before a moment `t`, and after the
 //! end of what ends, `d_t`, and the part `l` of the residuals that no parameter takes off, the loss at the strength `b` is estimated as
 //! `|l + b P d_t|²` with the projection `P` of the module above: for each `t` a sum over the blocks since then. A moment inside a second
-//! that is held out costs the same as any other, and a change of half a minute's weight after eight seconds is found though the
-//! recalibration has made that weight its own.
+//! that is held out costs the same as any other, and a weight that changes after eight seconds of forty is found though the recalibration
+//! has taken what hangs in the other thirty-two for its own.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,7 +22,7 @@ const LEFT_BY_PARAMETERS: f64 = 1e-6;
 
 /// What is compared with what, row by row.
 pub(super) struct Comparison<'a> {
-    /// Clock of the bench in the middle of the block of each row, s.
+    /// Clock of the bench where the block of each row begins, s.
     pub clock_s: &'a [f64],
     /// Part of the residuals that no parameter takes off.
     pub left: &'a DVector<f64>,
@@ -64,7 +64,7 @@ impl Comparison<'_> {
             let (from, until) = (&sums[from], &sums[until]);
             let along = from.left_by_change - until.left_by_change;
             let squared = from.change_squared - until.change_squared;
-            let left = squared - (&from.inside - &until.inside).norm_squared();
+            let left = squared - from.inside.metric_distance(&until.inside).powi(2);
             if left <= LEFT_BY_PARAMETERS * squared {
                 return None;
             }
