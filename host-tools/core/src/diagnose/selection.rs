@@ -276,9 +276,14 @@ struct Fitted {
 }
 
 impl Fitted {
+    /// Place, among the model's effects, of the one that was added last.
+    fn newest_place(&self) -> usize {
+        self.solution.model.effects.len() - 1
+    }
+
     /// The effect that was added last.
     fn newest(&self) -> ActiveEffect {
-        self.solution.model.effects[self.solution.model.effects.len() - 1]
+        self.solution.model.effects[self.newest_place()]
     }
 
     fn without_ordinary(&self) -> JointModel {
@@ -386,7 +391,7 @@ impl Search<'_> {
             let Some((chosen, with, without)) = self.best_showing(before, present, &mut fits, worth)? else {
                 return Ok(None);
             };
-            if self.is_no_parameter(without, &with)?
+            if self.is_no_parameter(without, &with, with.newest_place())?
                 && self.holds_across_recordings(without, &with, |a, b| worth(&POLICY, a, b))?
             {
                 return Ok(Some((chosen, with)));
@@ -461,7 +466,9 @@ impl Search<'_> {
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             let bare = self.without_exhausted(&rest)?;
             self.progress.advance(1);
-            if present.shows(&bare, |without, with| POLICY.worth_naming(without, with)) {
+            let is_worth_its_place = present.shows(&bare, |without, with| POLICY.worth_naming(without, with))
+                && self.is_no_parameter(&bare, present, present.layout.first_found() + index)?;
+            if is_worth_its_place {
                 chosen[index].stands(&bare, present);
                 index += 1;
             } else {

@@ -30,6 +30,9 @@ impl Search<'_> {
             }
             let (layout, with) = nothing.layout.with(&nothing.solution.model, rival.effect);
             let mut other = self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
+            if !self.is_no_parameter(nothing, &other, other.newest_place())? {
+                continue;
+            }
             let rest = first.others.iter().enumerate().filter(|(other, _)| *other != place);
             let mut others: Vec<Tried> = rest.map(|(_, tried)| tried.clone()).collect();
             others.push(own.clone());

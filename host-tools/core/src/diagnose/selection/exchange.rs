@@ -3,7 +3,7 @@
 //! A name is chosen while others are still missing, and what it is chosen for may be a part of what they do: its rivals of that round are
 //! fitted in its place beside the others, one takes the place where it predicts better, and the odds of all are those of the end.
 
-use bowden_model::effect::ActiveEffect;
+use bowden_model::effect::{ActiveEffect, Component};
 
 use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further, remove};
 use crate::diagnose::policy::POLICY;
@@ -52,6 +52,13 @@ impl Search<'_> {
         }
         let before = chosen[index].clone();
         let instances = instances(chosen, index);
+        if best.newest().descriptor().component == Component::Sensors {
+            let (layout, without) = present.without(&instances);
+            let without = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
+            if !self.is_no_parameter(&without, &best, best.newest_place())? {
+                return Ok(());
+            }
+        }
         remove(chosen, &instances);
         let tried = best.tried(best.loss);
         let is_other = |other: &Tried| !other.effect.is_beside(&tried.effect);

@@ -5,7 +5,7 @@
 //! friction that they contain, tell them apart. Play of a joint draws the resistance down by 6 to 9 %, and a gain of 0.91 takes back what
 //! that does to the current, which is right by the rig file.
 
-use bowden_model::effect::{ActiveEffect, Component};
+use bowden_model::effect::Component;
 use nalgebra::{DMatrix, DVector};
 
 use super::{Fitted, Search};
@@ -19,21 +19,27 @@ use crate::outcome::Failure;
 const SMALLEST: f64 = 1e-9;
 
 impl Search<'_> {
-    /// Whether the newest effect of `with` is told from the parameters: true for what is no effect of a sensor, for one that changes its
+    /// Whether effect `place` of `with` is told from the parameters, beside `without`, which lacks it: true for what is no effect of a sensor, for one that changes its
     /// own channel in a way in which no parameter does, by as much as a name must take off, and for one that takes off the share
     /// that a law must.
-    pub(super) fn is_no_parameter(&self, without: &Fitted, with: &Fitted) -> Result<bool, Failure> {
-        let effect = with.newest();
+    pub(super) fn is_no_parameter(
+        &self,
+        without: &Fitted,
+        with: &Fitted,
+        place: usize,
+    ) -> Result<bool, Failure> {
+        let effect = &with.solution.model.effects[place];
         let told = effect.descriptor().component != Component::Sensors
             || POLICY.worth_naming_untold(without.loss, with.loss)
             || self.progress.interrupted();
-        Ok(told || self.own_change(with, &effect)?.is_none_or(|own| own > POLICY.name_loss))
+        Ok(told || self.own_change(with, place)?.is_none_or(|own| own > POLICY.name_loss))
     }
 
-    /// Mean, in squared scales, of what `effect`, the newest of `with`, changes in its own channel and recalibrated parameters cannot change
+    /// Mean, in squared scales, of what effect `place` of `with` changes in its own channel and recalibrated parameters cannot change
     /// alike; `None` where the channel drives the replay.
-    fn own_change(&self, with: &Fitted, effect: &ActiveEffect) -> Result<Option<f64>, Failure> {
+    fn own_change(&self, with: &Fitted, place: usize) -> Result<Option<f64>, Failure> {
         let Solution { model, residuals, jacobian, .. } = &with.solution;
+        let effect = &model.effects[place];
         let [objective, _] = &self.objective.split();
         let is_of_sensor =
             |series| matches!(series, Series::Channel(channel) if effect.target.includes(channel));
@@ -49,7 +55,8 @@ impl Search<'_> {
         if own.is_empty() {
             return Ok(None);
         }
-        let effects = model.effects[..model.effects.len() - 1].to_vec();
+        let mut effects = model.effects.clone();
+        effects.remove(place);
         let right = objective.residuals(&JointModel { effects, ..model.clone() })?;
         let softly = |residuals: &Residuals, place: usize| soft(residuals.values[place]);
         let change = own.iter().map(|(_, place)| softly(residuals, *place) - softly(&right, *place));
@@ -73,7 +80,52 @@ fn left_by(slopes: DMatrix<f64>, change: &DVector<f64>) -> DVector<f64> {
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effect::{ActiveEffect, Target};
+    use bowden_model::effects::find;
+
     use super::*;
+    use crate::diagnose::hypotheses::Asked;
+    use crate::diagnose::layout::Layout;
+    use crate::fit::objective::Objective;
+    use crate::fit::solver::COARSE_STEP;
+    use crate::progress::Quiet;
+    use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
+
+    /// A gain of 1.1 beside a spring, before it and behind it; the spring is no sensor.
+    #[test]
+    fn what_a_sensor_changes_of_its_own_does_not_depend_on_its_place() {
+        let mut recording = test_bench::swung(3000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let usual = |id| ActiveEffect::with_defaults(find(id).unwrap());
+        let spring = usual("joint_spring");
+        let gain = ActiveEffect { target: Target::One(Channel::F2), ..usual("sensor_gain_error") };
+        let gain = gain.with("gain", 1.1);
+        let real = JointModel { effects: vec![spring, gain], ..model.clone() };
+        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let (asked, believed) = (Asked::default(), &model);
+        let search = Search { objective: &objective, believed, asked: &asked, progress: &Quiet };
+        let own_changes = |effects: [ActiveEffect; 2]| {
+            let nothing = (Layout::of(&model), model.clone());
+            let (layout, with) =
+                effects.into_iter().fold(nothing, |(layout, model), effect| layout.with(&model, effect));
+            let fitted = search.fit(layout, &with, &[COARSE_STEP]).unwrap();
+            [0, 1].map(|place| search.own_change(&fitted, place).unwrap())
+        };
+        let [of_gain, of_spring] = own_changes([gain, spring]);
+        let [spring_first, gain_behind] = own_changes([spring, gain]);
+        assert_eq!([of_spring, spring_first], [None; 2]);
+        let [of_gain, gain_behind] = [of_gain, gain_behind].map(Option::unwrap);
+        assert!(
+            of_gain > POLICY.name_loss && (gain_behind / of_gain - 1.0).abs() < 1e-3,
+            "{of_gain}, {gain_behind}"
+        );
+    }
 
     /// By hand: of (3, 4, 12) the first two are a combination of (1, 0, 0) and (1, 1, 0), whichever scale these have.
     #[test]
