@@ -329,5 +329,7 @@ pub async fn run(mut host: Host, mut port: Receiver<'static, UsbDriver>) {
             host.service.supervise(now_ms(), &mut host.reach);
         }
         count_round();
+        // A host whose packets are there already does not keep the other tasks from their turn.
+        yield_now().await;
     }
 }

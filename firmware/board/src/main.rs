@@ -19,11 +19,13 @@
 mod analog;
 mod boot_loader;
 mod bridge;
+mod ccm;
 mod chip;
 mod clock;
 mod encoder_bus;
 mod encoders;
 mod host;
+mod log_start;
 mod mask;
 mod queues;
 mod retained;
@@ -65,6 +67,7 @@ const ONCE: &str = "each task is started once";
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     boot_loader::enter_if_asked();
+    ccm::fill();
     // The HAL leaves its time driver at priority 0, which critical sections do not mask.
     interrupt::TIM5.set_priority(Priority::P3);
     let boot = retained::boot_cause();

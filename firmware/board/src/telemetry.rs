@@ -21,6 +21,9 @@ use crate::usb::{PACKET, UsbDriver};
 const LOOK: Duration = Duration::from_millis(1);
 
 /// Answers on their way, with the number of their request.
+// Nobody but the thread uses it.
+#[expect(unsafe_code, reason = "a place for a variable")]
+#[unsafe(link_section = ".bss.ccm.answers")]
 pub static ANSWERS: Channel<CriticalSectionRawMutex, (u16, FromBoard), 4> = Channel::new();
 
 /// Sends answers and samples; `period_ns` is asked for at every batch.
@@ -32,7 +35,11 @@ pub async fn run(port: Sender<'static, UsbDriver>, ends: SampleEnds) {
     loop {
         let said = select(ANSWERS.receive(), look.next()).await;
         let sent = match said {
-            Either::First((request, answer)) => line.say(Some(request), answer).await,
+            // A host that asks without a pause does not keep samples from their turn.
+            Either::First((request, answer)) => match line.say(Some(request), answer).await {
+                Ok(()) => source.pass_on(&mut line).await,
+                gone => gone,
+            },
             Either::Second(()) => source.pass_on(&mut line).await,
         };
         if sent.is_err() {
@@ -77,7 +84,7 @@ impl Source {
         for _ in 0..self.ends.samples.len() {
             if let Some(message) = self.next(mode) {
                 line.say(None, message).await?;
-                while let Ok((request, answer)) = ANSWERS.try_receive() {
+                if let Ok((request, answer)) = ANSWERS.try_receive() {
                     line.say(Some(request), answer).await?;
                 }
             }

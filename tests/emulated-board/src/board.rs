@@ -594,6 +594,16 @@ impl Board {
         results
     }
 
+    /// What calls of the functions measured fetched from the flash since counting started over: function and address of each block.
+    pub fn fetched_from_flash(&self) -> Vec<String> {
+        let machine = self.cpu.machine();
+        machine
+            .measure
+            .flash_blocks()
+            .map(|address| format!("{} ({address:#010x})", machine.image.function_at(address)))
+            .collect()
+    }
+
     /// Timing of the control tick since the start, or since its edges were taken out; `None` before two ticks.
     pub fn tick_timing(&self) -> Option<TickTiming> {
         let edges = self.edges(TICK_MARKER);

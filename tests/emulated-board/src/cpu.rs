@@ -11,7 +11,7 @@ use crate::error::BoardError;
 use crate::exceptions;
 use crate::machine::{Machine, Sleep, Trap};
 use crate::memory_map::{
-    BOOT_LOADER, CCM, CORE, FLASH, PERIPHERALS, RAM, RAM_WITHOUT_CCM, SYSTEM_MEMORY, WRITABLE_FLASH,
+    BOOT_LOADER, CCM, CORE, FLASH, PERIPHERALS, RAM, RAM_WITHOUT_CCM, Region, SYSTEM_MEMORY, WRITABLE_FLASH,
 };
 use crate::peripherals::rcc::ResetCause;
 use crate::peripherals::{boot_loader, system_memory};
@@ -31,6 +31,12 @@ const BREAKPOINT: u32 = 7;
 const LOG_POLL_S: f64 = 0.5e-3;
 
 type Uc<'a> = Unicorn<'a, Machine>;
+
+/// What there is of RAM. The CCM SRAM stands at one of its two places, where the image has it: the other one is then a bus fault, so
+/// that no byte is used under two addresses.
+fn rams(image: &Image) -> Vec<Region> {
+    if image.ccm_behind_sram2 { vec![RAM] } else { vec![RAM_WITHOUT_CCM, CCM] }
+}
 
 /// Reads a word of memory.
 pub(crate) fn read_word(uc: &Uc<'_>, address: u32) -> Result<u32, BoardError> {
@@ -118,11 +124,9 @@ impl Cpu {
         }
         if cause == ResetCause::PowerOn {
             let pattern = RAM_PATTERN.to_le_bytes();
-            for region in [if self.machine().image.uses_ccm { RAM_WITHOUT_CCM } else { RAM }, CCM] {
-                if region != CCM || self.machine().image.uses_ccm {
-                    let content = pattern.repeat(region.size as usize / 4);
-                    self.uc.mem_write(u64::from(region.start), &content)?;
-                }
+            for region in rams(&self.machine().image) {
+                let content = pattern.repeat(region.size as usize / 4);
+                self.uc.mem_write(u64::from(region.start), &content)?;
             }
         }
         let machine = self.uc.get_data_mut();
@@ -400,11 +404,8 @@ fn map_memories(uc: &mut Uc<'_>) -> Result<(), BoardError> {
             machine.refresh();
         }),
     )?;
-    if uc.get_data().image.uses_ccm {
-        uc.mem_map(u64::from(RAM_WITHOUT_CCM.start), u64::from(RAM_WITHOUT_CCM.size), Prot::ALL)?;
-        uc.mem_map(u64::from(CCM.start), u64::from(CCM.size), Prot::ALL)?;
-    } else {
-        uc.mem_map(u64::from(RAM.start), u64::from(RAM.size), Prot::ALL)?;
+    for region in rams(&uc.get_data().image) {
+        uc.mem_map(u64::from(region.start), u64::from(region.size), Prot::ALL)?;
     }
     uc.mem_map(u64::from(BOOT_LOADER.start), u64::from(BOOT_LOADER.size), Prot::READ | Prot::EXEC)?;
     uc.mem_write(u64::from(BOOT_LOADER.start), &boot_loader::image())?;
@@ -500,6 +501,11 @@ fn begin_block(uc: &mut Uc<'_>, address: u32, size: u32) {
         let stack_pointer = uc.reg_read(R::SP).unwrap_or(0) as u32;
         let link = uc.reg_read(R::LR).unwrap_or(0) as u32;
         uc.get_data_mut().measure.block(address, stack_pointer, link, depth, now);
+    }
+    let machine = uc.get_data_mut();
+    if machine.measure.active() && FLASH.contains(address) {
+        let depth = machine.scs.stack.len();
+        machine.measure.flash_block(address, depth);
     }
 }
 

@@ -3,7 +3,7 @@
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind};
 
 use crate::error::BoardError;
-use crate::memory_map::{CCM, FLASH, RAM, WRITABLE_FLASH};
+use crate::memory_map::{CCM, CCM_BEHIND_SRAM2, FLASH, RAM, WRITABLE_FLASH};
 
 /// A function or static of the image.
 #[derive(Debug, Clone)]
@@ -40,8 +40,8 @@ pub(crate) struct Image {
     pub statics: Vec<Symbol>,
     /// Address of the RTT control block.
     pub rtt: Option<u32>,
-    /// Whether anything lies at the CCM's own address.
-    pub uses_ccm: bool,
+    /// Whether the image has the CCM SRAM where it continues SRAM2, and not at its own address.
+    pub ccm_behind_sram2: bool,
     /// Sizes.
     pub sizes: ImageSizes,
     /// Lowest address that the stack may grow down to: end of the static data under the initial stack pointer.
@@ -101,8 +101,9 @@ impl Image {
                 "its initial stack pointer is {stack_top:#010x}, expected a word of RAM"
             )));
         };
-        let (mut ram_bytes, mut ram_code_bytes, mut stack_limit, mut uses_ccm) =
-            (0, 0, stack_memory.start, false);
+        let (mut ram_bytes, mut ram_code_bytes, mut stack_limit) = (0, 0, stack_memory.start);
+        let (mut ccm_behind_sram2, mut uses_ccm) =
+            (stack_memory == RAM && stack_top > CCM_BEHIND_SRAM2, false);
         for section in file.sections() {
             let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
             let (allocated, executable) = (sh_flags & 2 != 0, sh_flags & 4 != 0);
@@ -111,11 +112,18 @@ impl Image {
                 continue;
             }
             uses_ccm |= CCM.contains(start);
+            ccm_behind_sram2 |= RAM.contains(start) && start.saturating_add(size) > CCM_BEHIND_SRAM2;
             ram_bytes += size;
             ram_code_bytes += if executable { size } else { 0 };
             if start >= stack_memory.start && start < stack_top && start.saturating_add(size) <= stack_top {
                 stack_limit = stack_limit.max(start + size);
             }
+        }
+        if uses_ccm && ccm_behind_sram2 {
+            return Err(bad(format!(
+                "it uses the CCM SRAM at {:#010x} and at {CCM_BEHIND_SRAM2:#010x}, which is the same memory: leave one out of memory.x",
+                CCM.start
+            )));
         }
         let functions = symbols(&file, SymbolKind::Text);
         let statics = symbols(&file, SymbolKind::Data);
@@ -124,7 +132,7 @@ impl Image {
             .find(|symbol| symbol.name() == Ok("_SEGGER_RTT"))
             .map(|symbol| symbol.address() as u32);
         let sizes = ImageSizes { flash_bytes, ram_bytes, ram_code_bytes };
-        Ok(Self { flash, code, functions, statics, rtt, uses_ccm, sizes, stack_limit, stack_top })
+        Ok(Self { flash, code, functions, statics, rtt, ccm_behind_sram2, sizes, stack_limit, stack_top })
     }
 
     /// Whether the stack ends where a memory begins, so that a word more is a bus fault.

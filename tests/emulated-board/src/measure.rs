@@ -1,4 +1,6 @@
-//! Instructions and cycles of functions, interrupts that preempt them left out.
+//! Instructions and cycles of functions, interrupts that preempt them left out, and what of them comes from the flash.
+
+use std::collections::BTreeSet;
 
 /// Smallest, largest and mean of a count.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +66,8 @@ pub(crate) struct Measure {
     watches: Vec<Watch>,
     calls: Vec<Call>,
     preempted: Vec<Moment>,
+    /// Beginnings of the blocks that calls of watched functions fetched from the flash.
+    flash_blocks: BTreeSet<u32>,
 }
 
 impl Measure {
@@ -86,6 +90,7 @@ impl Measure {
             watch.calls = 0;
             (watch.instructions, watch.cycles) = (NOTHING, NOTHING);
         }
+        self.flash_blocks.clear();
     }
 
     /// Whether anything is watched.
@@ -124,6 +129,18 @@ impl Measure {
                 });
             }
         }
+    }
+
+    /// A block at `address` of the flash runs, `depth` exceptions deep.
+    pub(crate) fn flash_block(&mut self, address: u32, depth: usize) {
+        if self.calls.last().is_some_and(|call| call.depth == depth) {
+            self.flash_blocks.insert(address);
+        }
+    }
+
+    /// What calls of watched functions fetched from the flash: first addresses of the blocks.
+    pub(crate) fn flash_blocks(&self) -> impl Iterator<Item = u32> {
+        self.flash_blocks.iter().copied()
     }
 
     fn record(&mut self, call: Call, now: Moment) {
@@ -209,6 +226,16 @@ mod tests {
         assert_eq!(result.cycles, Spread { min: 7, max: 20, mean: 13.5 });
         measure.start_over();
         assert!(measure.results().is_empty());
+        // Outside of a call, inside, and in an interrupt that preempts it.
+        measure.flash_block(0x500, 0);
+        measure.block(0x100, 0x2000_1000, 0x201, 0, at(40, 200));
+        measure.flash_block(0x104, 0);
+        measure.flash_block(0x600, 1);
+        measure.block(0x200, 0x2000_1000, 0, 0, at(45, 208));
+        measure.flash_block(0x200, 0);
+        assert!(measure.flash_blocks().eq([0x104]));
+        measure.start_over();
+        assert_eq!(measure.flash_blocks().count(), 0);
         measure.block(0x100, 0x2000_1000, 0x201, 0, at(40, 200));
         measure.block(0x200, 0x2000_1000, 0, 0, at(45, 208));
         let result = &measure.results()[0];

@@ -16,7 +16,7 @@ impl Region {
     }
 
     /// First address behind.
-    pub(crate) fn end(self) -> u32 {
+    pub(crate) const fn end(self) -> u32 {
         self.start + self.size
     }
 }
@@ -31,6 +31,8 @@ pub(crate) const RAM: Region = Region { start: 0x2000_0000, size: 128 << 10 };
 pub(crate) const RAM_WITHOUT_CCM: Region = Region { start: 0x2000_0000, size: 96 << 10 };
 /// CCM SRAM at its own address.
 pub(crate) const CCM: Region = Region { start: 0x1000_0000, size: 32 << 10 };
+/// Where the CCM SRAM continues SRAM2.
+pub(crate) const CCM_BEHIND_SRAM2: u32 = RAM_WITHOUT_CCM.end();
 /// Boot loader of the manufacturer.
 pub(crate) const BOOT_LOADER: Region = Region { start: 0x1fff_0000, size: 28 << 10 };
 /// Page with unique id, flash size and factory calibration.

@@ -379,3 +379,28 @@ fn an_image_that_cannot_run_is_refused() {
     stack[84..88].copy_from_slice(&0x1000_u32.to_le_bytes());
     assert!(refuse(&stack).contains("stack pointer"), "{}", refuse(&stack));
 }
+
+/// Copies `movs r0, #42; bx lr` to the CCM SRAM, calls it, and stores r0.
+const FROM_CCM: &[u16] = &[
+    0xf04f, 0x5480, // mov.w r4, #0x10000000
+    0x4d03, // ldr r5, =0x4770202a
+    0x6025, // str r5, [r4]
+    0x3401, // adds r4, #1
+    0x47a0, // blx r4
+    0x4e02, // ldr r6, =0x20000100
+    0x6030, // str r0, [r6]
+    0xe7fe, // b .
+    0xbf00, // nop
+    0x202a, 0x4770, // literals
+    0x0100, 0x2000, //
+];
+
+/// RM0440, memory organization: 32 KiB at 0x1000 0000, where code runs. An image that does not use them behind SRAM2 finds them there only.
+#[test]
+fn code_runs_from_the_ccm_sram() {
+    let mut board = board(FROM_CCM, &[], &[("main", 0, 20)]);
+    board.run_for(1e-4).expect("it runs");
+    assert_eq!(words(&board, 0x2000_0100, 1), [42]);
+    assert!(board.memory(0x1000_7ffc, 4).is_some() && board.memory(0x1000_8000, 4).is_none());
+    assert!(board.memory(0x2001_7ffc, 4).is_some() && board.memory(0x2001_8000, 4).is_none());
+}

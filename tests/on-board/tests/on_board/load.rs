@@ -1,7 +1,7 @@
 //! Tick, memory and link at full load.
 
 use bowden_board::Board;
-use bowden_link::message::Goal;
+use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{State, ToBoard};
 use bowden_on_board_tests::Outcome;
 use bowden_on_board_tests::load::under_load;
@@ -63,5 +63,33 @@ fn the_joint_runs_at_twenty_kilohertz() -> Outcome {
     println!("{arrived} of {} samples", host.ticks.begun - begun);
     // Those of 10 ms at most are under way.
     assert!(arrived >= 19_800, "{arrived}, lost {:?}", host.telemetry.lost);
+    Ok(())
+}
+
+/// The core fetches from the CCM SRAM without wait states (RM0440, 2.1): all that a tick runs lies there while the joint drives, in
+/// every mode, with the telemetry that takes most. A tick that takes new parameters copies them by a function of the flash.
+#[test]
+fn the_tick_runs_from_the_ccm_sram() -> Outcome {
+    for mode in [Mode::Position, Mode::Torque, Mode::Hybrid, Mode::Impedance] {
+        let mut host = ready(1)?;
+        host.order(&ToBoard::RawTelemetry)?;
+        let amplitude = if mode == Mode::Torque { 0.05 } else { 0.3 };
+        let sine = Reference::Generated { shape: Shape::Sine, amplitude, offset: 0.0, frequency_hz: 1.0 };
+        host.order(&ToBoard::SetReference(sine))?;
+        host.order(&ToBoard::Enter(Goal::Run(mode)))?;
+        host.reach(State::Run, 0.1)?;
+        host.board.measure_symbol("ADC1_2")?;
+        host.board.take_measurements();
+        host.run(0.2)?;
+        host.order(&ToBoard::SetReference(Reference::Hold(0.0)))?;
+        host.run(0.2)?;
+        assert!(host.board.measurements()[0].calls > 4000);
+        assert_eq!(host.board.fetched_from_flash(), [] as [&str; 0], "{mode:?}");
+        host.set("controller.integral_time", 0.11)?;
+        host.run(0.01)?;
+        let fetched = host.board.fetched_from_flash();
+        assert!(fetched.iter().all(|block| block.contains("memcpy")), "{fetched:?}");
+        assert_eq!(host.status()?.state, State::Run);
+    }
     Ok(())
 }

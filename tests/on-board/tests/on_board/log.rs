@@ -5,6 +5,7 @@ use std::process::Command;
 
 use bowden_link::ToBoard;
 use bowden_link::message::Provocation;
+use bowden_on_board_tests::host::Host;
 use bowden_on_board_tests::tool::tool;
 use bowden_on_board_tests::{Outcome, image};
 
@@ -15,6 +16,34 @@ fn bowden(folder: &Path, arguments: &[&str]) -> Outcome<(Option<i32>, String, St
     let output = Command::new(tool()?).args(arguments).current_dir(folder).output().expect("the tool starts");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     Ok((output.status.code(), text(&output.stdout), text(&output.stderr)))
+}
+
+/// Board time between two looks of a probe that looks at every moment: two cycles of the core before its clock is set.
+const EVERY_MOMENT_S: f64 = 1.25e-7;
+
+/// Behind a panic's reset the block of the log still says how far the run before had written, and start-up gives it one word after
+/// the other.
+#[test]
+fn a_probe_that_looks_at_every_moment_of_a_start_reads_what_was_written() -> Outcome {
+    let mut host = moving()?;
+    host.set("supervisor.allow_provoke", 1.0)?;
+    host.board.deliver_faults(true);
+    host.board.take_log_bytes();
+    let begun = host.log().len();
+    host.order(&ToBoard::Provoke(Provocation::Panic))?;
+    let started = |host: &Host| host.log()[begun..].iter().any(|line| line.text.starts_with("bowden "));
+    let end_s = host.board.time_s() + 0.3;
+    while !started(&host) {
+        assert!(host.board.time_s() < end_s, "no start in {:?}", &host.log()[begun..]);
+        // The panic takes its time; the start is looked at closely.
+        let step_s = if host.board.counters().boots == 1 { 2e-5 } else { EVERY_MOMENT_S };
+        host.pass(step_s)?;
+    }
+    let malformed = host.log()[begun..].iter().filter(|line| line.text.contains("cannot be decoded")).count();
+    assert_eq!(malformed, 0, "{:?}", &host.log()[begun..]);
+    let bytes = host.board.take_log_bytes();
+    assert!(bytes.len() < 256, "{} bytes of {} lines", bytes.len(), host.log().len() - begun);
+    Ok(())
 }
 
 /// Two runs of the firmware: a joint that moves, a panic, and a second of rest behind the reset.

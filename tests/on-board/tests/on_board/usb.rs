@@ -1,7 +1,8 @@
 //! A host that does not read, sleeps, is unplugged, or sends rubbish: the tick goes on, losses are counted, the link comes back.
 
 use bowden_board::Injection;
-use bowden_link::{State, ToBoard};
+use bowden_link::frame::FRAME_LENGTH;
+use bowden_link::{Fault, Request, State, ToBoard, encode};
 use bowden_on_board_tests::Outcome;
 use bowden_on_board_tests::host::Host;
 
@@ -121,5 +122,108 @@ fn rubbish_is_counted_and_the_next_request_answered() -> Outcome {
     let status = host.status()?;
     assert!(status.bad_frames >= 2, "{status:?}");
     assert_eq!(status.fault, None);
+    Ok(())
+}
+
+/// What a flood did.
+#[derive(Debug)]
+struct Flood {
+    /// Bytes that the board took.
+    bytes: usize,
+    /// Most ticks by which telemetry was behind the board.
+    behind: u32,
+}
+
+/// Bytes that wait for the bus, so that no packet is short and none is missing.
+const WAITING: usize = 4096;
+
+/// Sends what `next` makes as fast as the bus takes it.
+fn flood(host: &mut Host, seconds: f64, mut next: impl FnMut(u16) -> Vec<u8>) -> Outcome<Flood> {
+    let end_s = host.board.time_s() + seconds;
+    let (mut flood, mut number) = (Flood { bytes: 0, behind: 0 }, 0);
+    while host.board.time_s() < end_s {
+        while host.board.usb_unsent() < WAITING {
+            let bytes = next(number);
+            number = number.wrapping_add(1);
+            flood.bytes += bytes.len();
+            host.board.usb_write(&bytes);
+        }
+        host.pass(1e-3)?;
+        let received = host.telemetry.next_tick().expect("telemetry is on");
+        flood.behind = flood.behind.max(host.ticks.begun.saturating_sub(received));
+        host.telemetry.take();
+    }
+    println!("{flood:?}, {:.0} kB/s", flood.bytes as f64 / seconds * 1e-3);
+    Ok(flood)
+}
+
+/// What holds during a flood: the watchdog is fed, the joint runs, the tick is on time.
+fn assert_running(host: &mut Host) -> Outcome {
+    assert!(host.ticks.period.spread() <= JITTER, "{:?}", host.ticks.period);
+    assert_eq!((host.board.counters().boots, host.status()?.state), (1, State::Run));
+    Ok(())
+}
+
+fn frame(number: u16, message: ToBoard) -> Vec<u8> {
+    let mut buffer = [0; FRAME_LENGTH];
+    encode(&Request { sequence: number, message }, &mut buffer).expect("it fits").to_vec()
+}
+
+/// Answers share the bus with telemetry, which loses samples then, counts them, and is whole again behind the flood.
+#[test]
+fn ten_seconds_of_requests_as_fast_as_they_are_taken_leave_the_joint_running() -> Outcome {
+    let mut host = streaming()?;
+    flood(&mut host, 10.0, |number| {
+        let message =
+            if number % 2 == 0 { ToBoard::ReadStatus } else { ToBoard::ReadParameter(number % 100) };
+        frame(number, message)
+    })?;
+    host.run(0.3)?;
+    assert_running(&mut host)?;
+    let telemetry = &host.telemetry;
+    assert_eq!((telemetry.missing, telemetry.disordered), (u64::from(telemetry.lost), 0));
+    let behind = host.ticks.begun.saturating_sub(telemetry.next_tick().expect("telemetry is on"));
+    assert!(behind <= 100, "{behind}");
+    Ok(())
+}
+
+/// Frames with a wrong byte, runs without an end, and a sign of life among 2000 of them, 10 ms apart or so.
+#[test]
+fn ten_seconds_of_rubbish_at_the_rate_of_the_bus_disturb_nothing() -> Outcome {
+    let mut host = streaming()?;
+    let before = host.status()?.bad_frames;
+    let flood = flood(&mut host, 10.0, |number| {
+        let mut bytes = frame(number, ToBoard::ReadStatus);
+        match number % 500 {
+            0 => return frame(number, ToBoard::Alive),
+            1 => bytes = vec![0x55; 3000],
+            _ => bytes[1] ^= 0x55,
+        }
+        bytes
+    })?;
+    // Of a frame that the flood left without an end the next request would be a part.
+    host.board.usb_write(&[0]);
+    assert!(host.status()?.bad_frames - before > 10_000);
+    // 12 ms: a batch is 24 samples, and the host looks every millisecond.
+    assert!(flood.behind <= 120, "{flood:?}");
+    let telemetry = &host.telemetry;
+    assert_eq!((telemetry.missing, telemetry.disordered, telemetry.lost), (0, 0, 0));
+    assert_running(&mut host)
+}
+
+/// Rubbish is no sign of life: the joint stops as with a host that says nothing.
+#[test]
+fn a_host_that_sends_nothing_but_rubbish_is_silent() -> Outcome {
+    let mut host = streaming()?;
+    let begun_s = host.board.time_s();
+    flood(&mut host, 0.7, |number| {
+        let mut bytes = frame(number, ToBoard::Alive);
+        bytes[1] ^= 0x55;
+        bytes
+    })?;
+    let record = host.await_fault(0.1)?;
+    assert_eq!(record.fault, Fault::HostSilent, "{record}");
+    let stopped_s = host.ticks.beginning_s(record.tick).expect("a tick of this run");
+    assert!((0.4..0.6).contains(&(stopped_s - begun_s)), "{record}: {} s", stopped_s - begun_s);
     Ok(())
 }
