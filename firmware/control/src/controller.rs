@@ -16,6 +16,7 @@ use crate::encoder::EncoderChannel;
 use crate::encoder::channel::EncoderFault;
 use crate::encoder::stuck::StuckWatch;
 use crate::impedance::ImpedanceInput;
+use crate::motion_watch::{MotionWatch, Turn};
 use crate::observer::{Motion, Observer};
 use crate::reference::{Origin, ReferenceConfig, ReferenceState};
 use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
@@ -32,6 +33,7 @@ pub struct Controller {
     supervisor: Supervisor,
     encoders: [EncoderChannel; 2],
     stuck: StuckWatch,
+    motion: MotionWatch,
     tensions: TensionChannels,
     supply: Supply,
     observer: Observer,
@@ -85,6 +87,7 @@ impl Controller {
             supervisor: Supervisor::default(),
             encoders: [EncoderChannel::default(); 2],
             stuck: StuckWatch::default(),
+            motion: MotionWatch::default(),
             tensions: TensionChannels::default(),
             supply: Supply::default(),
             observer: Observer::default(),
@@ -127,6 +130,7 @@ impl Controller {
             self.drive(&readings, inbox, &mut limits)
         } else {
             self.stuck.reset();
+            self.motion.reset();
             self.starts = false;
             // A joint that rests expects no friction.
             self.loops = Loops::default();
@@ -206,6 +210,7 @@ impl Controller {
         self.supervisor = Supervisor::default();
         self.encoders.iter_mut().for_each(EncoderChannel::reset);
         self.stuck = StuckWatch::default();
+        self.motion = MotionWatch::default();
         self.tensions = TensionChannels::default();
         self.supply = Supply::default();
         self.observer = Observer::default();
@@ -285,7 +290,11 @@ impl Controller {
             let bridge = heard.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
             let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
             let encoder = pulley.fault.map(|bad| of(0, bad)).or_else(|| joint.fault.map(|bad| of(1, bad)));
-            bridge.or(supply.found).or(encoder).or(tension).or_else(|| self.stand_still(counts))
+            bridge
+                .or(supply.found)
+                .or(encoder)
+                .or(tension)
+                .or_else(|| self.watch_motion(input, counts, theta[1], &tensions))
         } else {
             None
         };
@@ -293,18 +302,31 @@ impl Controller {
         Readings { counts, theta, lag, motion, tensions, load, measured_load, sheath, current, bus, found }
     }
 
-    fn stand_still(&mut self, counts: [i32; 2]) -> Option<Detection> {
+    /// What is wrong with the motion of a joint that is driven.
+    fn watch_motion(
+        &mut self,
+        input: &TickInput,
+        counts: [i32; 2],
+        theta_out: Angle,
+        tensions: &[Tension; 4],
+    ) -> Option<Detection> {
         if !self.supervisor.state().drives() {
             return None;
         }
         let (config, encoders) = (&self.config.stuck, &self.config.encoder);
-        let (channel, travel) = self.stuck.observe(config, encoders, counts)?;
-        Some(Detection {
-            fault: bowden_link::Fault::EncoderStuck,
-            channel,
-            got: travel.to_f32(),
-            limit: config.travel.to_f32(),
-        })
+        if let Some((channel, travel)) = self.stuck.observe(config, encoders, counts) {
+            let (got, limit) = (travel.to_f32(), config.travel.to_f32());
+            return Some(Detection { fault: bowden_link::Fault::EncoderStuck, channel, got, limit });
+        }
+        match self.motion.turn(&self.config.motion)? {
+            Turn::Joint => {
+                let follows =
+                    self.supervisor.state() == State::Run && self.supervisor.mode() == Mode::Position;
+                let reference = follows.then(|| Angle::from_bits(self.reference.value_bits()));
+                self.motion.joint(&self.config.motion, theta_out, reference)
+            }
+            Turn::Tension(n) => self.motion.tension(&self.config.motion, n, &input.tension_raw, tensions),
+        }
     }
 
     fn drive(&mut self, readings: &Readings, inbox: &mut impl Inbox, limits: &mut Limits) -> Action {

@@ -32,6 +32,7 @@ pub mod detection;
 pub mod drive;
 pub mod encoder;
 pub mod impedance;
+pub mod motion_watch;
 pub mod observer;
 pub mod parameters;
 pub mod reference;

@@ -245,12 +245,13 @@ impl Parameters {
 }
 
 /// Pairs of which the first has to be below the second.
-const ORDERED: [(&str, &str); 7] = [
+const ORDERED: [(&str, &str); 8] = [
     ("tension.rail_low", "tension.rail_high"),
     ("tension.slack", "tension.over"),
     ("tension.slack", "tendon.pretension"),
     ("limits.angle_minimum", "limits.angle_maximum"),
     ("limits.current", "supervisor.over_current"),
+    ("limits.speed", "supervisor.joint_speed"),
     ("supervisor.bus_minimum", "supervisor.bus_maximum"),
     ("supervisor.self_test_time", "supervisor.self_test_timeout"),
 ];
@@ -275,7 +276,50 @@ const WHOLE: [&str; 13] = [
 /// Last part of the names of switches, which are whole numbers too.
 const SWITCH: &str = ".enable";
 
+/// Limits, which are widened with the bridge off only: those that are wider where they are higher.
+const WIDER_ABOVE: [&str; 27] = [
+    "bridge.duty_limit",
+    "motor.continuous_current",
+    "motor.winding_time",
+    "tension.over",
+    "tension.debounce",
+    "tension.exponent_margin",
+    "tension.margin",
+    "tension.consistency_time",
+    "tension.stretch_margin",
+    "tension.stuck_travel",
+    "tension.stuck_time",
+    "limits.angle_maximum",
+    "limits.speed",
+    "limits.acceleration",
+    "limits.jerk",
+    "limits.torque",
+    "limits.torque_rate",
+    "limits.current",
+    "supervisor.over_current",
+    "supervisor.over_current_time",
+    "supervisor.bus_maximum",
+    "supervisor.bus_debounce",
+    "supervisor.joint_speed",
+    "supervisor.angle_margin",
+    "supervisor.tracking_error",
+    "supervisor.tracking_time",
+    "supervisor.host_timeout",
+];
+
+/// Those that are wider where they are lower.
+const WIDER_BELOW: [&str; 3] = ["tension.slack", "limits.angle_minimum", "supervisor.bus_minimum"];
+
 impl Specification {
+    /// Whether this is a limit of the joint, and `value` leaves it more than `before` does.
+    ///
+    /// `limits.contact_torque` is none of them: in the modes that yield it is what the host sets while the joint touches.
+    #[must_use]
+    pub fn widens(&self, before: f32, value: f32) -> bool {
+        (value > before && WIDER_ABOVE.contains(&self.name))
+            || (value < before && WIDER_BELOW.contains(&self.name))
+    }
+
     fn check(&self, value: f32) -> Result<(), Refusal> {
         let Self { minimum, maximum, .. } = *self;
         let counted = WHOLE.contains(&self.name) || self.name.ends_with(SWITCH);

@@ -314,6 +314,10 @@ impl Service {
         if !specification.changes_while_moving && port.view().state.drives() {
             return Err(Refusal::Moving);
         }
+        let before = self.parameters.get(index).unwrap_or(value);
+        if specification.widens(before, value) && port.view().state.drives() {
+            return Err(Refusal::Moving);
+        }
         let mut changed = self.parameters.clone();
         changed.set(index, value)?;
         self.act_on(changed, port)

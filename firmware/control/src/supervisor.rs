@@ -9,7 +9,8 @@
 //! | fault | off | self test | pretension check | ready | homing | run |
 //! |---|---|---|---|---|---|---|
 //! | encoder frames, jumps | | x | x | x | x | x |
-//! | encoder stuck | | | | | x | x |
+//! | encoder stuck, tension stuck, joint speed | | | | | x | x |
+//! | joint range, tracking error: position mode | | | | | | x |
 //! | tension at a rail | | x | x | x | x | x |
 //! | slack, over-tension, tensions that contradict each other or the stretch | | | | x | x | x |
 //! | over-current, bus voltage, bridge | | x | x | x | x | x |

@@ -252,6 +252,51 @@ fn swapped_tension_channels_are_found() {
     }
 }
 
+/// The joint's encoder stands while the reference moves at up to 0.63 rad/s from zero: 0.1 rad off after 0.16 s at least, found 0.1 s later.
+/// What finds a standing encoder sooner is switched off.
+#[test]
+fn a_joint_that_does_not_follow_is_found() {
+    let mut parameters = Parameters::default();
+    (parameters.encoder.stuck_travel, parameters.tension.stretch_margin) = (6.0, 1000.0);
+    (parameters.tension.margin, parameters.tension.exponent_margin) = (1000.0, 3.0);
+    (parameters.supervisor.tracking_error, parameters.supervisor.tracking_time) = (0.1, 0.1);
+    let mut bench = Bench::ready(parameters, joint());
+    bench.refer(Reference::Generated { shape: Shape::Sine, amplitude: 0.4, offset: 0.0, frequency_hz: 0.25 });
+    bench.order(Goal::Run(Mode::Position));
+    bench.disturbance = Some(|input| input.encoder[1].frame_raw = amt22(2000));
+    let (ticks, record) = trip(&mut bench, 10_000);
+    assert_eq!((record.fault, record.channel), (Fault::TrackingError, 0), "{record}");
+    assert!((record.limit - 0.1).abs() < 1e-5 && (0.1..0.25).contains(&record.got), "{record}");
+    // The ramp takes 0.5 s of the way.
+    assert!((2600..6000).contains(&ticks), "{ticks}");
+}
+
+/// A weight that swings under a torque of 0.5 N·m turns faster than 0.6 rad/s.
+#[test]
+fn a_joint_that_turns_too_fast_is_found() {
+    let mut parameters = Parameters::default();
+    (parameters.limits.speed, parameters.supervisor.joint_speed) = (0.5, 0.6);
+    let mut bench = Bench::ready(parameters, joint());
+    bench.refer(Reference::Generated { shape: Shape::Sine, amplitude: 0.3, offset: 0.0, frequency_hz: 1.0 });
+    bench.order(Goal::Run(Mode::Torque));
+    let (_, record) = trip(&mut bench, 20_000);
+    assert_eq!((record.fault, record.channel), (Fault::JointSpeed, 0), "{record}");
+    assert!((record.limit - 0.6).abs() < 1e-3 && (0.6..1.6).contains(&record.got), "{record}");
+}
+
+/// f4 always reads 30 N, which the others leave by more than 5 N.
+#[test]
+fn a_tension_channel_that_stands_is_found() {
+    let mut parameters = Parameters::default();
+    (parameters.tension.stretch_margin, parameters.tension.consistency_time) = (1000.0, 10.0);
+    let mut bench = running(parameters);
+    bench.disturbance = Some(|input| input.tension_raw[3] = 1477);
+    let (ticks, record) = trip(&mut bench, 20_000);
+    assert_eq!((record.fault, record.channel, record.limit), (Fault::TensionStuck, 3, 5.0), "{record}");
+    // 0.3 s at least.
+    assert!(record.got > 5.0 && ticks >= 3000, "{ticks} ticks, {record}");
+}
+
 #[test]
 fn faults_from_outside_count_everywhere_and_the_first_one_stays() {
     let mut bench = Bench::new(Parameters::default(), joint());

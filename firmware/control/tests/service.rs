@@ -135,6 +135,79 @@ fn what_would_jump_is_not_changed_while_moving() {
     assert!(tick.commands.is_empty());
 }
 
+/// Every limit, by its name: a step to the wider side is taken with the bridge off only, one to the narrower side always.
+#[test]
+fn limits_are_narrowed_while_driving_and_widened_with_the_bridge_off_only() {
+    for (name, narrow, wide) in [
+        ("limits.current", 2.0, 3.5),
+        ("limits.speed", 2.0, 3.5),
+        ("limits.angle_maximum", 1.0, 1.3),
+        ("limits.angle_minimum", -1.0, -1.3),
+        ("limits.torque", 0.5, 0.7),
+        ("bridge.duty_limit", 0.9, 0.96),
+        ("tension.over", 80.0, 95.0),
+        ("tension.slack", 2.0, 0.5),
+        ("supervisor.over_current", 7.0, 9.0),
+        ("supervisor.bus_minimum", 19.0, 17.0),
+        ("supervisor.bus_maximum", 29.0, 31.0),
+        ("supervisor.joint_speed", 30.0, 50.0),
+        ("supervisor.tracking_error", 0.2, 0.4),
+        ("supervisor.angle_margin", 0.05, 0.2),
+        ("supervisor.host_timeout", 0.3, 0.7),
+        ("motor.continuous_current", 3.5, 4.5),
+    ] {
+        let (mut service, mut tick) = (service(), tick_in(State::Run));
+        let write = |value| ToBoard::WriteParameter { index: index_of(name), value };
+        assert_eq!(asked(&mut service, &mut tick, 1, write(wide)), refused(Refusal::Moving), "{name}");
+        assert!(tick.commands.is_empty());
+        assert_eq!(asked(&mut service, &mut tick, 2, write(narrow)), Reply::Say(FromBoard::Done), "{name}");
+        // Back to where it was is wider, too.
+        let default = Parameters::specification(index_of(name)).unwrap().default;
+        assert_eq!(asked(&mut service, &mut tick, 3, write(default)), refused(Refusal::Moving), "{name}");
+        tick.view.state = State::Ready;
+        assert_eq!(asked(&mut service, &mut tick, 4, write(wide)), Reply::Say(FromBoard::Done), "{name}");
+        tick.view.state = State::Homing;
+        assert_eq!(asked(&mut service, &mut tick, 5, write(narrow)), Reply::Say(FromBoard::Done), "{name}");
+    }
+}
+
+/// Ceilings of the image: no message lifts them, bridge on or off, and a set that was stored with more is not taken.
+#[test]
+fn no_message_lifts_a_ceiling() {
+    for (name, ceiling) in [
+        ("limits.current", 13.0),
+        ("supervisor.over_current", 13.0),
+        ("motor.continuous_current", 13.0),
+        ("bridge.duty_limit", 0.98),
+        ("limits.speed", 100.0),
+        ("supervisor.joint_speed", 200.0),
+        ("limits.angle_maximum", 100.0),
+        ("supervisor.angle_margin", 1.0),
+        ("tension.over", 2000.0),
+        ("supervisor.host_timeout", 60.0),
+        ("supervisor.homing_timeout", 600.0),
+        ("supervisor.tracking_time", 60.0),
+        ("tension.stuck_time", 60.0),
+    ] {
+        let index = index_of(name);
+        let beyond = ceiling * (1.0 + 1e-6);
+        for state in [State::Off, State::Ready, State::Run, State::Fault] {
+            let (mut service, mut tick) = (service(), tick_in(state));
+            let before = service.parameters().get(index);
+            let answer = asked(&mut service, &mut tick, 1, ToBoard::WriteParameter { index, value: beyond });
+            assert!(
+                matches!(answer, Reply::Say(FromBoard::Refused(Refusal::OutOfRange { maximum, .. })) if maximum == ceiling)
+                    || answer == refused(Refusal::Moving),
+                "{name}: {answer:?}"
+            );
+            assert_eq!((service.parameters().get(index), tick.commands.len()), (before, 0), "{name}");
+        }
+        let mut stored = Parameters::default();
+        stored.set_unchecked(index, beyond);
+        assert!(matches!(stored.validate(), Err(Refusal::OutOfRange { .. })), "{name}");
+    }
+}
+
 #[test]
 fn a_repeated_request_appends_its_points_once() {
     let (mut service, mut tick) = (service(), tick_in(State::Run));

@@ -115,11 +115,15 @@ faults! {
     4 EncoderMissing "ticks" "no new encoder frame came" "check the encoder's wiring and the bus";
     5 EncoderStuck "rad" "an encoder stands while the other one moves" "check the encoder's coupling and the tendons";
     6 EncoderJump "rad/s" "an encoder jumped faster than the joint can move" "check the encoder's coupling and supply";
+    7 JointSpeed "rad/s" "the joint turns faster than it may" "look for a load that drives it, or raise supervisor.joint_speed";
+    8 JointRange "rad" "the joint is beyond its range" "bring it back with homing, or look for what pushes it";
+    9 TrackingError "rad" "the joint does not follow its reference" "look for a blocked or disconnected joint, or raise supervisor.tracking_error";
     10 TensionRail "V" "a tension channel is at a rail" "look for a broken wire between amplifier and load cell";
     11 Slack "N" "a tendon is slack" "restore the pretension";
     12 OverTension "N" "a tendon is pulled beyond its limit" "look for a blocked joint, or lower the reference";
     13 TensionInconsistent "N" "tensions at the two ends of a sheath do not fit its friction" "check gain and zero of the tension channels, and the sheath parameters";
     14 StretchInconsistent "N" "the tensions of a cable do not fit its stretch, which both encoders tell" "check gain, zero and order of the tension channels, the encoders' zeros, and the pretension";
+    15 TensionStuck "N" "a tension channel stands while another one moves" "look for an amplifier that hangs, or a channel without noise";
     20 OverCurrent "A" "motor current is beyond its limit" "look for a short circuit or a blocked motor";
     21 BusUnderVoltage "V" "bus voltage is too low" "check the supply";
     22 BusOverVoltage "V" "bus voltage is too high" "check the supply; braking may feed energy back";
@@ -166,10 +170,10 @@ impl FaultRecord {
         match (self.fault as u8, self.channel) {
             (1..=6, 0) => "input encoder",
             (1..=6, _) => "joint encoder",
-            (10..=12 | 41, 0) => "f1",
-            (10..=12 | 41, 1) => "f2",
-            (10..=12 | 41, 2) => "f3",
-            (10..=12 | 41, _) => "f4",
+            (10..=12 | 15 | 41, 0) => "f1",
+            (10..=12 | 15 | 41, 1) => "f2",
+            (10..=12 | 15 | 41, 2) => "f3",
+            (10..=12 | 15 | 41, _) => "f4",
             (13 | 14, 0) => "cable a",
             (13 | 14, _) => "cable b",
             _ => "",

@@ -22,6 +22,7 @@ use crate::drive::{DriveConfig, PositionConfig, TorqueConfig};
 use crate::encoder::stuck::StuckConfig;
 use crate::encoder::{CountRaw, EncoderConfig};
 use crate::impedance::ImpedanceConfig;
+use crate::motion_watch::{LOOK_S, MotionConfig};
 use crate::observer::ObserverConfig;
 use crate::reference::shaper::ShaperLimits;
 use crate::reference::{ReferenceBounds, TorqueWindow};
@@ -43,6 +44,7 @@ pub struct TickConfig {
     pub(crate) rate_hz: u16,
     pub(crate) encoder: [EncoderConfig; 2],
     pub(crate) stuck: StuckConfig,
+    pub(crate) motion: MotionConfig,
     pub(crate) tension: TensionConfig,
     pub(crate) supply: SupplyConfig,
     pub(crate) input_radius: Gain<Tension, Torque>,
@@ -77,6 +79,7 @@ impl TickConfig {
             rate_hz,
             encoder: [input, joint],
             stuck,
+            motion,
             tension,
             supply,
             input_radius,
@@ -104,6 +107,7 @@ impl TickConfig {
         self.encoder[0] = *input;
         self.encoder[1] = *joint;
         self.stuck = *stuck;
+        self.motion = *motion;
         self.tension = *tension;
         self.supply = *supply;
         self.input_radius = *input_radius;
@@ -156,6 +160,7 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
             band_counts: parameters.encoder.stuck_band as u16,
             ticks: ticks(parameters.encoder.stuck_time, period_s),
         },
+        motion: motion(parameters, period_s, reach.angle),
         tension: tension(parameters, period_s)?,
         supply: supply(parameters, period_s)?,
         input_radius: gain(parameters.pulley.input_radius, "pulley.input_radius")?,
@@ -188,6 +193,23 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
             .ok_or_else(|| conflict("controller.torque_gain"))?,
         impedance: ImpedanceConfig::new(parameters).ok_or_else(|| conflict("impedance.stiffness"))?,
     })
+}
+
+/// What the motion of the joint may be; `range_rad` is that of its reference.
+fn motion(parameters: &Parameters, period_s: f32, range_rad: [f32; 2]) -> MotionConfig {
+    let (supervisor, tension) = (&parameters.supervisor, &parameters.tension);
+    let margin_rad = supervisor.angle_margin;
+    MotionConfig {
+        look_ticks: ticks(LOOK_S, period_s),
+        travel: Angle::from_f32(supervisor.joint_speed * LOOK_S),
+        range: [range_rad[0] - margin_rad, range_rad[1] + margin_rad].map(Angle::from_f32),
+        margin: Angle::from_f32(margin_rad),
+        error: Angle::from_f32(supervisor.tracking_error),
+        error_looks: ticks(supervisor.tracking_time, LOOK_S),
+        tension_travel: Tension::from_f32(tension.stuck_travel),
+        tension_looks: ticks(tension.stuck_time, LOOK_S),
+        fitted: fitted(parameters),
+    }
 }
 
 /// Whole ticks of a time, at least 1.

@@ -95,6 +95,10 @@ pub struct Tensions {
     pub fitted: f32,
     /// How far the mean tension of a cable may be from the one that its stretch tells, N.
     pub stretch_margin: f32,
+    /// Change of a tension that the others have to notice, N.
+    pub stuck_travel: f32,
+    /// Time for which a channel may have the same code while another one has changed so far, s.
+    pub stuck_time: f32,
 }
 
 /// Pulleys.
@@ -261,6 +265,14 @@ pub struct Supervision {
     pub homing_timeout: f32,
     /// Time for which the host may be silent while the joint moves, s.
     pub host_timeout: f32,
+    /// Speed of the joint that is a fault, rad/s.
+    pub joint_speed: f32,
+    /// How far the joint may be beyond the range of its reference in position mode, rad.
+    pub angle_margin: f32,
+    /// Error of the angle that is a fault in position mode, rad.
+    pub tracking_error: f32,
+    /// Time for which it has to be there, s.
+    pub tracking_time: f32,
     /// 1: the host may provoke failures of the firmware, for tests.
     pub allow_provoke: f32,
 }

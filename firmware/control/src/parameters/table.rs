@@ -158,4 +158,10 @@ parameter_table! {
     bridge.wake_time, "s", 0.0, 1.0, 0.02, true;
     motor.continuous_current, "A", 0.05, 13.0, 4.0, true;
     motor.winding_time, "s", 0.1, 3600.0, 30.0, true;
+    supervisor.joint_speed, "rad/s", 0.2, 200.0, 40.0, true;
+    supervisor.angle_margin, "rad", 0.01, 1.0, 0.1, true;
+    supervisor.tracking_error, "rad", 0.005, 10.0, 0.3, true;
+    supervisor.tracking_time, "s", 0.01, 60.0, 1.0, true;
+    tension.stuck_travel, "N", 0.1, 1000.0, 5.0, true;
+    tension.stuck_time, "s", 0.02, 60.0, 0.3, true;
 }

@@ -1,7 +1,7 @@
 //! Every fault of sensors, supply and motion, provoked at the pins of the running board.
 
 use bowden_board::{Board, Cable, EncoderAt, EncoderMounting, EncoderPart, Injection, Rail, TensionAt};
-use bowden_link::message::{Goal, Reference};
+use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{Fault, FaultRecord, State, ToBoard};
 use bowden_on_board_tests::host::Host;
 use bowden_on_board_tests::{Outcome, image};
@@ -48,6 +48,77 @@ fn a_loose_magnet_is_a_jump() -> Outcome {
 fn an_encoder_that_stands_is_found() -> Outcome {
     // 0.15 rad at about 0.9 rad/s, and 20 ms.
     injected(Injection::EncoderStuck(EncoderAt::Joint), Fault::EncoderStuck, 1, 0.35).map(|_| ())
+}
+
+/// What finds a joint encoder or a tension that stands before the motion of the joint does, switched off.
+fn without_comparisons(host: &mut Host) -> Outcome {
+    host.set("encoder.stuck_travel", 6.0)?;
+    host.set("tension.consistency_time", 10.0)
+}
+
+/// The joint's encoder stands while the reference goes on at up to 0.94 rad/s: 0.1 rad in 0.11 s at least, and 0.1 s.
+#[test]
+fn a_joint_that_does_not_follow_is_found() -> Outcome {
+    let mut host = ready(1)?;
+    without_comparisons(&mut host)?;
+    host.set("supervisor.tracking_error", 0.1)?;
+    host.set("supervisor.tracking_time", 0.1)?;
+    host.follow(LIVELY)?;
+    host.run(1.0)?;
+    let (record, opening) = stop_by(&mut host, Injection::EncoderStuck(EncoderAt::Joint), 1.0)?;
+    assert_eq!((record.fault, record.channel), (Fault::TrackingError, 0), "{record}");
+    assert!(record.got > 0.1 && (0.1..0.5).contains(&opening.after_s), "{record}: {opening:?}");
+    Ok(())
+}
+
+/// The correction of the joint's encoder is set to what no encoder has: the measured angle jumps by up to 0.2 rad, out of a range that ends
+/// where the reference turns.
+#[test]
+fn a_joint_beyond_its_range_is_found() -> Outcome {
+    let mut host = ready(1)?;
+    host.set("limits.angle_maximum", 0.3)?;
+    host.set("supervisor.angle_margin", 0.03)?;
+    host.set("correction.joint_encoder.amplitude", 0.2)?;
+    host.set("correction.joint_encoder.limit", 0.2)?;
+    host.set("correction.joint_encoder.phase", 3.0)?;
+    host.follow(Reference::Hold(0.29))?;
+    host.run(2.0)?;
+    assert_eq!(host.status()?.fault, None);
+    host.set("correction.joint_encoder.enable", 1.0)?;
+    let (record, _) = stopped(&mut host, 0.05)?;
+    assert_eq!((record.fault, record.channel), (Fault::JointRange, 0), "{record}");
+    assert!((record.limit - 0.33).abs() < 1e-4 && (0.33..0.51).contains(&record.got), "{record}");
+    Ok(())
+}
+
+/// In torque mode a weight swings as fast as its torque lets it.
+#[test]
+fn a_joint_that_turns_too_fast_is_found() -> Outcome {
+    let mut host = ready(1)?;
+    host.set("limits.speed", 0.5)?;
+    host.set("supervisor.joint_speed", 0.6)?;
+    let swing = Reference::Generated { shape: Shape::Sine, amplitude: 0.3, offset: 0.0, frequency_hz: 1.0 };
+    host.order(&ToBoard::SetReference(swing))?;
+    host.order(&ToBoard::Enter(Goal::Run(Mode::Torque)))?;
+    host.reach(State::Run, 0.1)?;
+    host.run(0.02)?;
+    let (record, _) = stopped(&mut host, 3.0)?;
+    assert_eq!((record.fault, record.channel), (Fault::JointSpeed, 0), "{record}");
+    assert!((record.limit - 0.6).abs() < 1e-3 && (0.6..1.6).contains(&record.got), "{record}");
+    Ok(())
+}
+
+/// 30 looks in 0.3 s with one code, while the others swing by more than 5 N. By chance it may have had that code for a look or three before it stands.
+#[test]
+fn a_tension_channel_that_stands_is_found() -> Outcome {
+    let mut host = ready(1)?;
+    without_comparisons(&mut host)?;
+    host.follow(LIVELY)?;
+    host.run(1.0)?;
+    let (record, opening) = stop_by(&mut host, Injection::TensionStuck(TensionAt::F4), 2.5)?;
+    assert_eq!((record.fault, record.channel, record.limit), (Fault::TensionStuck, 3, 5.0), "{record}");
+    assert!(record.got > 5.0 && opening.after_s >= 0.265, "{record}: {opening:?}");
+    Ok(())
 }
 
 /// A board with two AS5045, told so over the link, and its joint moving.

@@ -69,7 +69,11 @@ fn channels_that_are_swapped_or_stuck_are_found_while_the_sheaths_move() -> Outc
         assert!(
             matches!(
                 fault,
-                Fault::TensionInconsistent | Fault::StretchInconsistent | Fault::Slack | Fault::OverTension
+                Fault::TensionInconsistent
+                    | Fault::StretchInconsistent
+                    | Fault::Slack
+                    | Fault::OverTension
+                    | Fault::TensionStuck
             ),
             "{injection:?}: {fault:?}"
         );
