@@ -32,7 +32,9 @@ impl Search<'_> {
         let told = effect.descriptor().component != Component::Sensors
             || POLICY.worth_naming_untold(without.loss, with.loss)
             || self.progress.interrupted();
-        Ok(told || self.own_change(with, place)?.is_none_or(|own| own > POLICY.name_loss))
+        let left_by = |own: f64| (without.loss - own).max(0.0);
+        let is_worth_a_name = |own| POLICY.worth_naming(without.loss, left_by(own));
+        Ok(told || self.own_change(with, place)?.is_none_or(is_worth_a_name))
     }
 
     /// Mean, in squared scales, of what effect `place` of `with` changes in its own channel and recalibrated parameters cannot change
@@ -121,10 +123,7 @@ mod tests {
         let [spring_first, gain_behind] = own_changes([spring, gain]);
         assert_eq!([of_spring, spring_first], [None; 2]);
         let [of_gain, gain_behind] = [of_gain, gain_behind].map(Option::unwrap);
-        assert!(
-            of_gain > POLICY.name_loss && (gain_behind / of_gain - 1.0).abs() < 1e-3,
-            "{of_gain}, {gain_behind}"
-        );
+        assert!(of_gain > 0.0 && (gain_behind / of_gain - 1.0).abs() < 1e-3, "{of_gain}, {gain_behind}");
     }
 
     /// By hand: of (3, 4, 12) the first two are a combination of (1, 0, 0) and (1, 1, 0), whichever scale these have.
