@@ -73,6 +73,13 @@ impl Policy {
         self.worth_naming(before, after) && before - after > self.law_share * before
     }
 
+    /// Whether an effect that is worth its name shows where it takes least off, too: what limits a reading or stops a joint is idle most of
+    /// the time, and other physics that is missing hides all but a little of it there.
+    #[must_use]
+    pub fn shows_elsewhere(&self, before: f64, after: f64) -> bool {
+        before - after > self.name_loss && self.pays(before, after)
+    }
+
     /// Whether so many further instances of an effect that has its name are worth having.
     #[must_use]
     pub fn worth_having(&self, before: f64, after: f64, instances: usize) -> bool {
@@ -165,6 +172,16 @@ mod tests {
             assert_eq!(POLICY.worth_naming_untold(before, after), named, "{before} to {after}");
         }
         assert!(!POLICY.worth_stating(0.7, 0.35));
+    }
+
+    /// A reading that is cut off at its limit, beside a winding that heats up unseen: of 3.52 it takes 0.45 off away from its limit, an
+    /// eighth. What a single moment asks for takes nothing off elsewhere.
+    #[test]
+    fn what_is_idle_most_of_the_time_has_to_show_elsewhere_and_no_more() {
+        assert!(!POLICY.worth_naming(3.52, 3.07) && POLICY.shows_elsewhere(3.52, 3.07));
+        for (before, after) in [(3.52, 3.4), (0.5, 0.41), (3.5, 3.6)] {
+            assert!(!POLICY.shows_elsewhere(before, after), "{before} to {after}");
+        }
     }
 
     #[test]

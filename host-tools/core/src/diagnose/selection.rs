@@ -5,7 +5,7 @@
 //!
 //! What is held out takes no part. That a fit sees what it is chosen by costs little: an effect has two or three parameters, and of
 //! hundreds of residuals that know nothing of each other they take off a hundredth, where a name must take off 15 % and a law 30 %
-//! ([`POLICY`]), and that also without the tenth of the seconds that speak most for it.
+//! ([`POLICY`]), a law also without the tenth of the seconds that speak most for it, where a name must show.
 
 mod across;
 mod begin_again;
@@ -21,6 +21,7 @@ use std::cmp::Ordering;
 
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
 use bowden_model::effects::find;
+use bowden_model::law;
 use rayon::prelude::*;
 
 use super::hypotheses::Asked;
@@ -296,10 +297,15 @@ impl Fitted {
         places.iter().rev().fold(all, |(layout, model), place| layout.without(&model, *place))
     }
 
-    /// Whether it is worth its place beside `before`, also without what speaks most for it.
-    fn shows(&self, before: &Self, worth: impl Fn(f64, f64) -> bool) -> bool {
+    /// Whether `effect`, which `before` lacks, is worth its place, and shows also without what speaks most for it: an effect of the
+    /// catalogue at all, a law by as much again, for one of many forms fits a few moments.
+    fn shows(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
+        let is_law = law::of(effect).is_some();
+        let elsewhere = |[without, with]: &[f64; 2]| {
+            worth(*without, *with) || !is_law && POLICY.shows_elsewhere(*without, *with)
+        };
         let quieter = without_the_loudest(&before.stretch_losses, &self.stretch_losses);
-        worth(before.loss, self.loss) && quieter.iter().all(|[without, with]| worth(*without, *with))
+        worth(before.loss, self.loss) && quieter.iter().all(elsewhere)
     }
 
     /// Loss with the advantage that simpler effects get.
@@ -409,7 +415,8 @@ impl Search<'_> {
         worth: Worth,
     ) -> Result<Option<(Chosen, Fitted, &'f Fitted)>, Failure> {
         // Those that show everywhere before those that only one place asks for.
-        let shows = |fitted: &Fitted| fitted.shows(before, |without, with| worth(&POLICY, without, with));
+        let worth_it = |without, with| worth(&POLICY, without, with);
+        let shows = |fitted: &Fitted| fitted.shows(before, &fitted.newest(), worth_it);
         fits.sort_by_key(|fitted| !shows(fitted));
         let showing = fits.iter().take_while(|fitted| shows(fitted)).count();
         let finalists = if before.layout == present.layout { 1 } else { FINALISTS };
@@ -428,8 +435,8 @@ impl Search<'_> {
             ordinary: present.loss,
             with_both: with_ordinary.loss,
         };
-        let beside_it = |without, with| worth(&POLICY, without, with);
-        if !losses.found(worth) || !(losses.replaces_ordinary() || with_ordinary.shows(present, beside_it)) {
+        let shows_beside_it = || with_ordinary.shows(present, &with_ordinary.newest(), worth_it);
+        if !losses.found(worth) || !(losses.replaces_ordinary() || shows_beside_it()) {
             return Ok(None);
         }
         // Those that were not fitted beside the ordinary are taken to gain by it as the best did.
@@ -466,7 +473,8 @@ impl Search<'_> {
             let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
             let bare = self.without_exhausted(&rest)?;
             self.progress.advance(1);
-            let is_worth_its_place = present.shows(&bare, |without, with| POLICY.worth_naming(without, with))
+            let is_worth = |without, with| POLICY.worth_naming(without, with);
+            let is_worth_its_place = present.shows(&bare, &chosen[index].effect, is_worth)
                 && self.is_no_parameter(&bare, present, present.layout.first_found() + index)?;
             if is_worth_its_place {
                 chosen[index].stands(&bare, present);

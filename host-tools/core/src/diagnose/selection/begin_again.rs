@@ -66,7 +66,8 @@ impl Search<'_> {
         (other, others_chosen): (&Fitted, &[Chosen]),
     ) -> Result<bool, Failure> {
         if !self.recordings_judge_one_another() {
-            return Ok(other.shows(present, |without, with| POLICY.worth_naming(without, with)));
+            let is_worth = |without, with| POLICY.worth_naming(without, with);
+            return Ok(other.shows(present, &other.newest(), is_worth));
         }
         let [here, there] = [chosen, others_chosen].map(handicap_of_all);
         let better = |loss: f64, others_loss: f64| there * others_loss < here * loss;

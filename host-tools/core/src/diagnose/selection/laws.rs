@@ -43,7 +43,7 @@ impl Search<'_> {
                 self.one_more(&before, Kind::Law, (RIVALLING * removed_share).max(PROMISING))?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
             if let Some((found, with)) = self.found(&before, &beside, fits, Policy::worth_stating)?
-                && with.shows(present, |without, with| better(&POLICY, without, with))
+                && with.shows(present, &with.newest(), |without, with| better(&POLICY, without, with))
             {
                 chosen.truncate(kept);
                 chosen.push(found);

@@ -43,7 +43,7 @@ impl Search<'_> {
             self.progress.stage("fitting further instances", 0);
             let with = self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?;
             let worth = |without: f64, with: f64| POLICY.worth_having(without, with, added);
-            if self.progress.interrupted() || !with.shows(present, worth) {
+            if self.progress.interrupted() || !with.shows(present, &effect, worth) {
                 continue;
             }
             if !self.holds_across_recordings(present, &with, worth)? {
