@@ -74,10 +74,11 @@ impl Policy {
     }
 
     /// Whether an effect that is worth its name shows where it takes least off, too: what limits a reading or stops a joint is idle most of
-    /// the time, and other physics that is missing hides all but a little of it there.
+    /// the time, and other physics that is missing hides all but a little of it there. Where more than `much_left` is left that little is
+    /// more likely an imitation, and is not taken for it.
     #[must_use]
     pub fn shows_elsewhere(&self, before: f64, after: f64) -> bool {
-        before - after > self.name_loss && self.pays(before, after)
+        before - after > self.name_loss && self.pays(before, after) && after <= self.much_left
     }
 
     /// Whether so many further instances of an effect that has its name are worth having.
@@ -179,7 +180,7 @@ mod tests {
     #[test]
     fn what_is_idle_most_of_the_time_has_to_show_elsewhere_and_no_more() {
         assert!(!POLICY.worth_naming(3.52, 3.07) && POLICY.shows_elsewhere(3.52, 3.07));
-        for (before, after) in [(3.52, 3.4), (0.5, 0.41), (3.5, 3.6)] {
+        for (before, after) in [(3.52, 3.4), (0.5, 0.41), (3.5, 3.6), (80.0, 70.0)] {
             assert!(!POLICY.shows_elsewhere(before, after), "{before} to {after}");
         }
     }
