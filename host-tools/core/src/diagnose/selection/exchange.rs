@@ -45,20 +45,12 @@ impl Search<'_> {
         own.loss_after = present.loss;
         own.model = present.without_ordinary();
         own.compared[1] = present.solution.model.clone();
+        let own_handicapped = handicap(&own.effect) * present.loss;
+        rivals.retain(|rival| rival.handicapped() < own_handicapped);
         rivals.sort_by(Fitted::best_first);
-        let best = rivals.swap_remove(0);
-        if best.handicapped() >= handicap(&own.effect) * present.loss {
-            return Ok(());
-        }
-        let before = chosen[index].clone();
         let instances = instances(chosen, index);
-        if best.newest().descriptor().component == Component::Sensors {
-            let (layout, without) = present.without(&instances);
-            let without = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
-            if !self.is_no_parameter(&without, &best, best.newest_place())? {
-                return Ok(());
-            }
-        }
+        let Some(best) = self.first_told(rivals, present, &instances)? else { return Ok(()) };
+        let before = chosen[index].clone();
         remove(chosen, &instances);
         let tried = best.tried(best.loss);
         let is_other = |other: &Tried| !other.effect.is_beside(&tried.effect);
@@ -70,6 +62,34 @@ impl Search<'_> {
         chosen.push(Chosen { effect, model, loss_before: before.loss_before, loss_after, compared, others });
         *present = best;
         Ok(())
+    }
+
+    /// The first of `rivals` that is told from the parameters, beside `present` without what they stand in the place of.
+    fn first_told(
+        &self,
+        rivals: Vec<Fitted>,
+        present: &Fitted,
+        instances: &[usize],
+    ) -> Result<Option<Fitted>, Failure> {
+        let mut without: Option<Fitted> = None;
+        for rival in rivals {
+            // Only a sensor has to be held against a fit without it.
+            if rival.newest().descriptor().component != Component::Sensors {
+                return Ok(Some(rival));
+            }
+            let beside = match without.take() {
+                Some(fitted) => fitted,
+                None => {
+                    let (layout, model) = present.without(instances);
+                    self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?
+                }
+            };
+            if self.is_no_parameter(&beside, &rival, rival.newest_place())? {
+                return Ok(Some(rival));
+            }
+            without = Some(beside);
+        }
+        Ok(None)
     }
 
     /// The listed rivals of a name, which stand first among its others, each fitted in its place beside all that was found.

@@ -2,7 +2,7 @@
 //!
 //! What is missing elsewhere bends parameters, and a sensor that is said to be wrong can pay what that costs in its own channel. The
 //! current of a motor whose angle is prescribed is `(V - k_t ω) / R`: another gain is another `R` and `k_t`, and only torques, with all
-//! friction that they contain, tell them apart. Play of a joint draws the resistance down by 6 to 9 %, and a gain of 0.91 takes back what
+//! friction that they contain, tell them apart. Play of a joint draws the resistance down by 2 to 8 %, and a gain of 0.91 takes back what
 //! that does to the current, which is right by the rig file.
 
 use bowden_model::effect::Component;
@@ -19,9 +19,9 @@ use crate::outcome::Failure;
 const SMALLEST: f64 = 1e-9;
 
 impl Search<'_> {
-    /// Whether effect `place` of `with` is told from the parameters, beside `without`, which lacks it: true for what is no effect of a sensor, for one that changes its
-    /// own channel in a way in which no parameter does, by as much as a name must take off, and for one that takes off the share
-    /// that a law must.
+    /// Whether effect `place` of `with` is told from the parameters, beside `without`, which lacks it: true for what is no effect of a
+    /// sensor, for one that changes its own channel in a way in which no parameter does, by as much as a name must take off, and for
+    /// one that takes off the share that a law must.
     pub(super) fn is_no_parameter(
         &self,
         without: &Fitted,

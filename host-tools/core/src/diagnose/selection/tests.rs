@@ -4,7 +4,8 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 use nalgebra::DMatrix;
 
-use super::{Chosen, Losses, Selected, Tried, handicap, largest_ordinary, negligible};
+use super::{Chosen, Fitted, Losses, POLICY, Selected, Tried, handicap, largest_ordinary, negligible};
+use crate::diagnose::layout::Layout;
 use crate::diagnose::policy::Policy;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::Solution;
@@ -163,5 +164,34 @@ fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
             found,
             "{losses:?}"
         );
+    }
+}
+
+/// A reading at its limit in one second of ten, beside what takes 3.5 in each: of 6.65 it takes 3.65 off, of the 3.5 elsewhere 0.45. A law
+/// that did so is not found, nor is what only the one second asks for, nor an effect where twenty times as much is left.
+#[test]
+fn what_is_idle_most_of_the_time_shows_and_a_law_as_much_elsewhere_too() {
+    let bench = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
+    let baseline = nothing_found(&bench).baseline;
+    let fitted = |at_limit: f64, elsewhere: f64, scale: f64| {
+        let of = |second| 10.0 * scale * if second == 0 { at_limit } else { elsewhere };
+        let stretch_losses = (0..10).map(|second| ((0, second), [of(second), 10.0])).collect();
+        let loss = scale * (0.1 * at_limit + 0.9 * elsewhere);
+        let (layout, solution) = (Layout::of(&bench), baseline.clone());
+        Fitted { layout, solution, loss, stretch_losses, finished: true, unseen: false }
+    };
+    let name = ActiveEffect::with_defaults(find("sensor_saturation").unwrap());
+    let law = ActiveEffect::with_defaults(bowden_model::law::find("law_reading_is_curved").unwrap());
+    for (effect, elsewhere, scale, shows) in [
+        (name, 3.05, 1.0, true),
+        (law, 3.05, 1.0, false),
+        (name, 3.45, 1.0, false),
+        (name, 3.05, 20.0, false),
+        (law, 2.0, 1.0, true),
+    ] {
+        let (before, with) = (fitted(35.0, 3.5, scale), fitted(2.5, elsewhere, scale));
+        let worth = |without, with| POLICY.worth_naming(without, with);
+        let id = effect.descriptor().id;
+        assert_eq!(with.shows(&before, &effect, worth), shows, "{id}, {elsewhere} times {scale}");
     }
 }
