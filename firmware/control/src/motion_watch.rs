@@ -9,9 +9,9 @@
 //! | tracking error | position mode | at every look for a time, the angle was farther from the reference than it may be |
 //! | tension stuck | every mode, homing too | at every look for a time, a channel had the same code, while another one moved |
 //!
-//! A joint that follows its reference back into a range that was narrowed, or from where it rested, is no fault. Homing has no range. A count of an encoder in 10 ms is 0.15 rad/s. A tension
-//! channel has the noise of its amplifier; at a standard deviation of one code it repeats a code in two of five looks at most, so 30 in a row are
-//! one in 10¹¹.
+//! A joint that follows its reference back into a range that was narrowed, or from where it rested, is no fault. Homing has no range. A
+//! count of an encoder in 10 ms is 0.15 rad/s. A tension channel has the noise of its amplifier; at a standard deviation of one code it
+//! repeats a code in two of five looks at most, so 30 in a row are one in 10¹¹.
 
 use bowden_link::Fault;
 

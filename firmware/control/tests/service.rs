@@ -155,6 +155,20 @@ fn limits_are_narrowed_while_driving_and_widened_with_the_bridge_off_only() {
         ("supervisor.angle_margin", 0.05, 0.2),
         ("supervisor.host_timeout", 0.3, 0.7),
         ("motor.continuous_current", 3.5, 4.5),
+        ("motor.winding_time", 20.0, 40.0),
+        ("tension.debounce", 0.0005, 0.002),
+        ("tension.exponent_margin", 0.1, 0.2),
+        ("tension.margin", 3.0, 5.0),
+        ("tension.consistency_time", 0.04, 0.06),
+        ("tension.stretch_margin", 10.0, 20.0),
+        ("tension.stuck_travel", 4.0, 6.0),
+        ("tension.stuck_time", 0.2, 0.4),
+        ("limits.acceleration", 200.0, 400.0),
+        ("limits.jerk", 15_000.0, 25_000.0),
+        ("limits.torque_rate", 4.0, 6.0),
+        ("supervisor.over_current_time", 0.000_15, 0.0003),
+        ("supervisor.bus_debounce", 0.004, 0.006),
+        ("supervisor.tracking_time", 0.5, 2.0),
     ] {
         let (mut service, mut tick) = (service(), tick_in(State::Run));
         let write = |value| ToBoard::WriteParameter { index: index_of(name), value };

@@ -159,10 +159,9 @@ fn a_fault_a_bus_error_and_the_ripple_table_are_computed_again() -> Outcome {
     let first =
         stdout.split("from tick ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<usize>().ok());
     let first = first.expect("the first tick");
-    let time = text.lines().next().and_then(|names| names.split(',').position(|name| name == "t_s"));
-    let cell =
-        text.lines().nth(tripped[0].0 + 1).and_then(|line| line.split(',').nth(time?)?.parse::<f64>().ok());
-    let fault = (cell.expect("a time") * 1e4).round() as usize;
+    let times = marked(&text, "t_s");
+    let (_, time_s) = times.iter().find(|(row, _)| *row == tripped[0].0).expect("the fault's row");
+    let fault = (time_s.parse::<f64>().expect("a time") * 1e4).round() as usize;
     let rows = text.lines().count() - 1;
     let covered = ticks <= rows && first + ticks > fault && ticks + 500 > rows;
     assert!(covered, "{ticks} of {rows}, from tick {first} on, fault in tick {fault}: {stdout}");
