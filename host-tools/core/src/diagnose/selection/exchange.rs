@@ -77,12 +77,11 @@ impl Search<'_> {
             if rival.newest().descriptor().component != Component::Sensors {
                 return Ok(Some(rival));
             }
-            let beside = match without.take() {
-                Some(fitted) => fitted,
-                None => {
-                    let (layout, model) = present.without(instances);
-                    self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?
-                }
+            let beside = if let Some(fitted) = without.take() {
+                fitted
+            } else {
+                let (layout, model) = present.without(instances);
+                self.fit(layout, &model, &[COARSE_STEP, FINE_STEP])?
             };
             if self.is_no_parameter(&beside, &rival, rival.newest_place())? {
                 return Ok(Some(rival));
