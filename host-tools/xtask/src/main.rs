@@ -18,6 +18,7 @@ mod peers;
 mod process;
 mod prove;
 mod python;
+mod selection;
 mod system_packages;
 mod tally;
 mod test;

@@ -6,9 +6,6 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Selects what is built for the host but is no default member of the workspace, in every command alike.
-pub const EMULATED_BOARD: [&str; 4] = ["--package", "bowden-board", "--package", "bowden-on-board-tests"];
-
 /// Folder of the workspace.
 pub fn workspace() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -9,8 +9,8 @@ use crate::process::{self, built, cargo, find_program, target_folder, workspace}
 /// Package and crate, below the workspace.
 const PACKAGE: &str = "host-tools/python";
 
-/// Selects the crate: only Python loads it, so it is no default member of the workspace.
-pub const CRATE: [&str; 2] = ["--package", "bowden-python"];
+/// The crate: only Python loads it, so it is no default member of the workspace.
+pub const CRATE: &str = "bowden-python";
 
 /// The interpreter: `PYTHON`, or `python3`. `Err` says why there is none that would do.
 ///

@@ -3,10 +3,11 @@
 use std::fmt;
 use std::time::{Duration, Instant};
 
+use crate::firmware::Image;
 use crate::parts::Parts;
-use crate::process::{self, EMULATED_BOARD, built, cargo, shared};
+use crate::process::{self, built, cargo, shared};
 use crate::tally::Tally;
-use crate::{browser, cross_target, firmware, python, system_packages};
+use crate::{browser, cross_target, firmware, python, selection, system_packages};
 
 /// Which tests are run; all when no part is named.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -38,18 +39,28 @@ impl Options {
 /// When a test fails, or a part cannot be run.
 pub fn run(options: Options) -> Result<(), String> {
     let mut outcomes = Vec::new();
+    let programs = match options.board().then(|| timed("images", images)) {
+        Some((Ok(images), _)) if options.host() => Some(Programs::of_all(images)),
+        Some((Ok(images), _)) => Some(Programs::of_the_board(images)),
+        Some((Err(reason), took)) => {
+            outcomes.push(Outcome { part: "board", result: Err(reason), took });
+            options.host().then(Programs::of_the_host)
+        }
+        None => options.host().then(Programs::of_the_host),
+    };
     let mut command_is_built = false;
-    if options.host() {
-        let outcome = timed("host", host);
-        // Its own tests build it, with other features of its dependencies: to build it alone takes a minute more.
-        command_is_built = outcome.result.is_ok();
-        outcomes.push(outcome);
+    if let Some(programs) = programs {
+        let (built, took) = timed("build", || programs.build());
+        command_is_built = built.is_ok();
+        let (result, took) = match built {
+            Ok(()) => timed(programs.part, || programs.run()),
+            Err(reason) => (Err(reason), took),
+        };
+        outcomes.push(Outcome { part: programs.part, result, took });
     }
     if options.python() {
-        outcomes.push(timed("python", || python::tests(command_is_built)));
-    }
-    if options.board() {
-        outcomes.push(timed("board", || board(command_is_built)));
+        let (result, took) = timed("python", || python::tests(command_is_built));
+        outcomes.push(Outcome { part: "python", result, took });
     }
     println!();
     for outcome in &outcomes {
@@ -74,22 +85,74 @@ impl fmt::Display for Outcome {
             Ok(done) => ("", done),
             Err(reason) => ("FAILED: ", reason),
         };
-        write!(f, "{:<6} {what}{text} ({} min {:02} s)", self.part, seconds / 60, seconds % 60)
+        write!(f, "{:<14} {what}{text} ({} min {:02} s)", self.part, seconds / 60, seconds % 60)
     }
 }
 
-fn timed(part: &'static str, run: impl FnOnce() -> Result<String, String>) -> Outcome {
-    println!("\n== tests: {part}");
+/// What `run` returns, and the time it took.
+fn timed<T>(step: &str, run: impl FnOnce() -> T) -> (T, Duration) {
+    println!("\n== tests: {step}");
     let started = Instant::now();
     let result = run();
-    Outcome { part, result, took: started.elapsed() }
+    (result, started.elapsed())
 }
 
-/// Tests of everything that is built for the host, but for the emulated board.
-fn host() -> Result<String, String> {
+/// The release images, and what the emulator is built with.
+fn images() -> Result<Vec<Image>, String> {
+    system_packages::ensure()?;
+    cross_target::ensure()?;
+    firmware::build()
+}
+
+/// Test programs that cargo builds and runs together.
+#[derive(Debug)]
+struct Programs {
+    part: &'static str,
+    selected: Vec<&'static str>,
+    images: Vec<Image>,
+    /// Whether those of the host are among them, some of which want recordings and a browser.
+    host: bool,
+}
+
+impl Programs {
+    fn of_all(images: Vec<Image>) -> Self {
+        let selected = selection::for_the_host(python::interpreter().is_ok());
+        Self { part: "host and board", selected, images, host: true }
+    }
+
+    fn of_the_host() -> Self {
+        Self { part: "host", selected: Vec::new(), images: Vec::new(), host: true }
+    }
+
+    fn of_the_board(images: Vec<Image>) -> Self {
+        Self { part: "board", selected: selection::emulated_board().collect(), images, host: false }
+    }
+
+    /// Builds them, and the command that they start.
+    fn build(&self) -> Result<(), String> {
+        if !self.host {
+            process::run(&mut cargo(&["build", "--package", "bowden"]), &[0])?;
+        }
+        process::run(cargo(&["test", "--no-run"]).args(&self.selected), &[0])
+    }
+
+    fn run(&self) -> Result<String, String> {
+        let mut tests = cargo(&["test", "--no-fail-fast"]);
+        tests.args(&self.selected);
+        firmware::announce(&self.images, &mut tests);
+        tests.env("BOWDEN_BIN", built("debug", "bowden")?);
+        if self.host && lacks_recordings_or_browser() {
+            // Passed tests are silent otherwise, and a skipped one passes.
+            tests.args(["--", "--show-output"]);
+        }
+        Tally::of(&mut tests).map(|tally| tally.to_string())
+    }
+}
+
+/// Whether tests will have nothing to work on; says what is missing.
+fn lacks_recordings_or_browser() -> bool {
     let data = shared().join("data");
     let recordings = if data.is_dir() { Ok(()) } else { Err(format!("{} is not there", data.display())) };
-    let mut tests = cargo(&["test", "--no-fail-fast"]);
     let mut lacking = false;
     for (what, found) in [("real recordings", recordings), ("Chromium", browser::ensure())] {
         if let Err(reason) = found {
@@ -97,26 +160,7 @@ fn host() -> Result<String, String> {
             lacking = true;
         }
     }
-    if lacking {
-        // Passed tests are silent otherwise, and a skipped one passes.
-        tests.args(["--", "--show-output"]);
-    }
-    Tally::of(&mut tests).map(|tally| tally.to_string())
-}
-
-/// Tests of the release images, which are built first, as is the command that talks to the board.
-fn board(command_is_built: bool) -> Result<String, String> {
-    system_packages::ensure()?;
-    cross_target::ensure()?;
-    let images = firmware::build()?;
-    if !command_is_built {
-        process::run(&mut cargo(&["build", "--package", "bowden"]), &[0])?;
-    }
-    let mut tests = cargo(&["test", "--no-fail-fast"]);
-    tests.args(EMULATED_BOARD);
-    firmware::announce(&images, &mut tests);
-    tests.env("BOWDEN_BIN", built("debug", "bowden")?);
-    Tally::of(&mut tests).map(|tally| tally.to_string())
+    lacking
 }
 
 #[cfg(test)]
@@ -145,9 +189,9 @@ mod tests {
     fn a_closing_line_tells_part_outcome_and_time() {
         let result = Ok("3 tests passed".to_owned());
         let outcome = Outcome { part: "host", result, took: Duration::from_secs(125) };
-        assert_eq!(outcome.to_string(), "host   3 tests passed (2 min 05 s)");
+        assert_eq!(outcome.to_string(), "host           3 tests passed (2 min 05 s)");
         let result = Err("no image".to_owned());
         let outcome = Outcome { part: "board", result, took: Duration::from_millis(900) };
-        assert_eq!(outcome.to_string(), "board  FAILED: no image (0 min 00 s)");
+        assert_eq!(outcome.to_string(), "board          FAILED: no image (0 min 00 s)");
     }
 }
