@@ -76,6 +76,8 @@ pub struct ParameterSpec {
     pub searched: bool,
     /// Values that a search tries one by one, each as a hypothesis of its own; empty for all others.
     pub forms: &'static [f64],
+    /// What is known of it before any recording, value and standard deviation; `None` for nothing.
+    pub believed: Option<[f64; 2]>,
 }
 
 impl ParameterSpec {
@@ -88,7 +90,18 @@ impl ParameterSpec {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        Self { name, unit, lower, upper, default, scale: Scale::Linear, meaning, searched: true, forms: &[] }
+        Self {
+            name,
+            unit,
+            lower,
+            upper,
+            default,
+            scale: Scale::Linear,
+            meaning,
+            searched: true,
+            forms: &[],
+            believed: None,
+        }
     }
 
     /// Positive parameter whose steps are ratios.
@@ -100,13 +113,20 @@ impl ParameterSpec {
         default: f64,
         meaning: &'static str,
     ) -> Self {
-        Self { name, unit, lower, upper, default, scale: Scale::Log, meaning, searched: true, forms: &[] }
+        Self { scale: Scale::Log, ..Self::linear(name, unit, [lower, upper], default, meaning) }
     }
 
     /// The same parameter, left alone by a search for missing physics.
     #[must_use]
     pub const fn not_searched(mut self) -> Self {
         self.searched = false;
+        self
+    }
+
+    /// The same parameter, of which `value` is believed with a standard deviation: what recordings hardly show stays there.
+    #[must_use]
+    pub const fn believed_within(mut self, value: f64, std: f64) -> Self {
+        self.believed = Some([value, std]);
         self
     }
 

@@ -156,6 +156,7 @@ macro_rules! nominal {
                 meaning: $meaning,
                 searched: true,
                 forms: &[],
+                believed: None,
             },
             get: |joint| joint.$section.map(|part| part.$name),
             slot: |joint| joint.$section.as_mut().map(|part| &mut part.$name),

@@ -151,11 +151,22 @@ fn joint_viscous_friction() {
 
 #[test]
 fn joint_spring() {
-    // Without hardening: together with an unknown weight a cubic part cannot be told from the sine of gravity. Over 0.6 rad
-    // either way that sine bends by 6 %: spring and weight are told apart to 3.4 % of the spring, three of which are held.
+    // Over 0.6 rad either way the sine of gravity bends by 6 %: spring and weight are told apart to 3.4 % of the spring, three of
+    // which are held.
     let concealed = bench::JointSpring { stiffness_nm_per_rad: 0.45, hardening_per_rad2: 0.0, rest_rad: 0.1 };
     Recovery::of(concealed, 16, as_it_is)
         .finds("stiffness_nm_per_rad", 0.45, 0.1 * 0.45)
+        .finds("rest_rad", 0.1, 0.1 * 0.1)
+        .leaves_less_than(0.3);
+}
+
+/// A harness that is stiffer where it is bent more: by 0.6 rad 36 % stiffer.
+#[test]
+fn joint_spring_that_hardens() {
+    let concealed = bench::JointSpring { stiffness_nm_per_rad: 0.45, hardening_per_rad2: 1.0, rest_rad: 0.1 };
+    Recovery::of(concealed, 26, as_it_is)
+        .finds("stiffness_nm_per_rad", 0.45, 0.1 * 0.45)
+        .finds("hardening_per_rad2", 1.0, 0.3)
         .finds("rest_rad", 0.1, 0.1 * 0.1)
         .leaves_less_than(0.3);
 }

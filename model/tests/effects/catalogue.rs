@@ -65,6 +65,7 @@ fn suffix(unit: &str) -> Option<&'static str> {
         "N/rad" => "_n_per_rad",
         "1/s" => "_per_s",
         "1/W" => "_per_w",
+        "1/rad²" => "_per_rad2",
         "rad" => "_rad",
         "rad/s" => "_rad_s",
         "m" => "_m",

@@ -123,6 +123,20 @@ fn static_torque_shows_spring_stop_and_payload() {
     let theta = sprung.plant.theta_out_rad();
     near("rest angle", torque_nm(&sprung), WEIGHT_NM * theta.sin() + 0.3 * (theta - 0.2), 1e-6);
 
+    // Bent by 0.6 rad and more, a spring with 2/rad² is some two thirds stiffer.
+    let mut hardened = Run::new(
+        joint(0.0),
+        &[spring.with("hardening_per_rad2", 2.0)],
+        (InputBoundary::Angle, OutputBoundary::Arm),
+        5e-4,
+    );
+    hardened.until(6.0, |t| at(-0.4 * t.min(1.0)));
+    let theta = hardened.plant.theta_out_rad();
+    let bent_rad = theta - 0.2;
+    assert!(bent_rad < -0.55, "{bent_rad}");
+    let spring_nm = 0.3 * bent_rad + 0.6 * bent_rad.powi(3);
+    near("hardening", torque_nm(&hardened), WEIGHT_NM * theta.sin() + spring_nm, 1e-6);
+
     let mut run = run(Some("payload_change"));
     for (until_s, mass_kg) in [(9.9, 1.5), (16.0, 2.0)] {
         run.until(until_s, |t| at(0.4 * t.min(1.0)));

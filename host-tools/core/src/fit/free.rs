@@ -120,18 +120,18 @@ impl Free {
         let spec = *active.descriptor().parameters.get(parameter)?;
         let start = active.parameters[parameter];
         let size = match spec.scale {
+            Scale::Linear if let Some([_, std]) = spec.believed => std,
             Scale::Log => rate_size(&spec, start, law::of(active).is_some()),
             Scale::Linear if spec.default != 0.0 => {
                 typical(model, active.descriptor().component, &spec).abs()
             }
             Scale::Linear => 0.1 * (spec.upper - spec.lower),
         };
-        Some(Self {
-            place: Place::Effect { effect, parameter },
-            spec,
-            start,
-            size,
-            prior: (0.0, f64::INFINITY),
+        let place = Place::Effect { effect, parameter };
+        let free = Self { place, spec, start, size, prior: (0.0, f64::INFINITY) };
+        Some(match spec.believed {
+            Some([value, std]) => free.believed_within(value, std / size),
+            None => free,
         })
     }
 
