@@ -122,7 +122,7 @@ fn a_joint_of_a_model_takes_the_rigs_values_and_nothing_else_changes() {
                1\naxial_stiffness_n = 7e4\npretension_n = 20\n[load]\nmass_kg = 1\narm_m = 0.1\ninertia_kg_m2 = \
                0\nviscous_nm_s_per_rad = 0.3\n[simulation]\neffects = \
                [\"joint_coulomb_friction\", \"joint_spring\"]\n[effects.joint_coulomb_friction]\ntorque_nm = \
-               0.07\n[effects.joint_spring]\nstiffness_nm_per_rad = 1.5\nrest_rad = 0.5\n";
+               0.07\n[effects.joint_spring]\nstiffness_nm_per_rad = 1.5\nrest_rad = 0.5\nhardening_per_rad2 = 0.4\n";
     let (text, mapped) = into_mjcf(&Rig::parse(rig, "rig.toml").unwrap(), &path, "knee").unwrap();
     // In the model's unit and from its zero, which is hanging straight down but for rounding.
     let degrees = text.split("springref=\"").nth(1).unwrap().split('"').next().unwrap();
@@ -138,6 +138,8 @@ fn a_joint_of_a_model_takes_the_rigs_values_and_nothing_else_changes() {
     assert!(
         mapped.iter().any(|one| one.says == "load.mass_kg, arm_m, inertia_kg_m2" && one.becomes.is_err())
     );
+    let says = |text: &str| mapped.iter().any(|one| one.becomes.as_ref().is_ok_and(|it| it.ends_with(text)));
+    assert!(says("it does not harden"), "{mapped:#?}");
 }
 
 #[test]

@@ -38,9 +38,10 @@ pub(super) fn of_effects(effects: &[ActiveEffect], mapped: &mut Vec<Mapped>) -> 
                 Ok(format!("damping += {value} of the joint"))
             }
             "joint_spring" => {
-                let rest_rad = active.parameters[1];
+                let [_, rest_rad, hardening_per_rad2, ..] = active.parameters;
                 (output.stiffness, output.springref_rad) = (value, rest_rad);
-                Ok(format!("stiffness = {value}, springref = {rest_rad} of the joint"))
+                let straight = if hardening_per_rad2 > 0.0 { "; it does not harden" } else { "" };
+                Ok(format!("stiffness = {value}, springref = {rest_rad} of the joint{straight}"))
             }
             "motor_coulomb_friction" => {
                 input.frictionloss += value;

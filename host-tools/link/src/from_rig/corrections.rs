@@ -169,6 +169,7 @@ pub(super) fn joint_coulomb(active: &ActiveEffect, draft: &mut Draft, source: &s
     set(draft, source, &JOINT_FRICTION, &[("correction.joint_friction.coulomb", active.parameters[0])])
 }
 
+/// The board's spring is straight: of one that hardens it takes the stiffness at rest, which is never more than what acts.
 pub(super) fn joint_spring(active: &ActiveEffect, draft: &mut Draft, source: &str) -> Result<(), String> {
     let [stiffness_nm_per_rad, rest_rad, ..] = active.parameters;
     let values = [
