@@ -120,6 +120,34 @@ fn facts_of_a_board_come_as_json() {
 }
 
 #[test]
+fn what_was_made_of_a_run_comes_as_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = |arguments: &[&str], expected: i32| -> serde_json::Value {
+        let (status, stdout, stderr) = bowden(folder.path(), &[arguments, &["--json"]].concat());
+        assert_eq!(status, expected, "{arguments:?}: {stderr}");
+        serde_json::from_str(&stdout).unwrap()
+    };
+    let recorded = json(&["record", "--port", "sim", "--seconds", "0.2", "--out", "a.csv"], 0);
+    let facts = json(&["info", "a.csv"], 0);
+    assert_eq!((&recorded["out"], &recorded["rows"]), (&"a.csv".into(), &facts[0]["rows"]));
+    assert_eq!((&recorded["duration_s"], &recorded["tick_us"]), (&facts[0]["duration_s"], &100.0.into()));
+
+    // Nothing that could be diagnosed is among them.
+    std::fs::create_dir(folder.path().join("runs")).unwrap();
+    std::fs::write(folder.path().join("runs/torn.csv"), "t_s,duty\n0,x\n").unwrap();
+    std::fs::write(folder.path().join("runs/rig.toml"), "schema = \"bowden-rig/1\"\n").unwrap();
+    let survey = json(&["survey", "runs", "--out", "found", "--quiet"], 3);
+    assert_eq!(
+        (&survey["recordings"], &survey["diagnosed"], &survey["kept"], &survey["left"]),
+        (&1.into(), &0.into(), &0.into(), &0.into())
+    );
+    let failed = &survey["failed"][0];
+    assert_eq!(failed["recording"], "torn.csv");
+    assert!(failed["reason"].as_str().unwrap().contains("line 2"), "{failed}");
+    assert_eq!(survey["page"], "found/survey.html");
+}
+
+#[test]
 fn nothing_is_coloured_in_a_pipe() {
     let folder = tempfile::tempdir().unwrap();
     let cases: [&[&str]; 5] =

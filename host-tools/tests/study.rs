@@ -379,10 +379,12 @@ fn every_bench_of_a_diagnosis_gets_its_rig_file() {
         );
     }
     fs::write(folder.join("study.toml"), study).unwrap();
-    let (status, _, errors) = bowden(folder, &["diagnose", "study.toml", "--out", "out", "--quiet"]);
+    let (status, printed, errors) =
+        bowden(folder, &["diagnose", "study.toml", "--out", "out", "--quiet", "--json"]);
     assert_eq!((status, errors.as_str()), (0, ""));
     let text = fs::read_to_string(folder.join("out/diagnosis.json")).unwrap();
     let diagnosis: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&printed).unwrap(), diagnosis);
     let named: Vec<&str> = diagnosis["effects"]
         .as_array()
         .unwrap()

@@ -11,7 +11,7 @@ use bowden_core::rig::RigDocument;
 use bowden_core::study::LoadedStudy;
 use bowden_model::effects::CATALOGUE;
 
-use super::{load_study, outcome_of, print};
+use super::{load_study, outcome_of, print, print_json};
 use crate::interrupt;
 use crate::progress::UntilInterrupted;
 
@@ -34,6 +34,9 @@ pub struct DiagnoseArguments {
     /// Try this effect too; for those that are not tried unless asked for. May be repeated
     #[arg(long, value_name = "EFFECT", value_parser = clap::builder::PossibleValuesParser::new(on_request()))]
     also: Vec<String>,
+    /// Print JSON: what stands in diagnosis.json
+    #[arg(long)]
+    json: bool,
 }
 
 /// Effects that are tried only where the user asks for them.
@@ -82,9 +85,14 @@ impl DiagnoseArguments {
         let mut rigs: Vec<(&str, &mut RigDocument)> =
             names.iter().map(String::as_str).zip(&mut documents).collect();
         let page = save(&diagnosed, &mut rigs, &out)?;
-        print(&format!("{}\n{}\n", diagnosed.findings.diagnosis.summary, page.display()))?;
+        let diagnosis = &diagnosed.findings.diagnosis;
+        if self.json {
+            print_json(diagnosis)?;
+        } else {
+            print(&format!("{}\n{}\n", diagnosis.summary, page.display()))?;
+        }
         let mut outcome = outcome_of(study.recordings.iter().map(|listed| &listed.recording));
-        if !diagnosed.findings.diagnosis.complete {
+        if !diagnosis.complete {
             outcome.extend([
                 "stopped early: not every effect was tried; run it again to the end before trusting it",
             ]);

@@ -10,7 +10,10 @@ use bowden_core::recording::{
 use bowden_host_link::firmware_log::LogDecoder;
 use bowden_host_link::firmware_log::import::LoggedRun;
 
+use serde::Serialize;
+
 use super::log::{each_piece, load_image};
+use super::{print, print_json};
 use crate::progress::under_way;
 
 /// Arguments of `bowden import`.
@@ -32,6 +35,19 @@ pub struct ImportArguments {
     /// Make rows of the line with this text
     #[arg(long, value_name = "TEXT")]
     rows: Option<String>,
+    /// Print JSON: one object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was made of a log.
+#[derive(Serialize)]
+struct Facts<'a> {
+    out: String,
+    rows: usize,
+    columns: &'a [String],
+    /// Rows before which something else was logged.
+    rows_with_events: usize,
 }
 
 impl ImportArguments {
@@ -59,13 +75,21 @@ impl ImportArguments {
             let (out, reason) = (self.out.display(), output::describe(&error));
             Failure::failed(format!("{out}: cannot be written: {reason}; choose another place"))
         })?;
-        let events = run.events.iter().filter(|event| !event.is_empty()).count();
-        super::print(&format!(
-            "{}: {} rows of {}, events before {events} of them\n",
-            self.out.display(),
-            run.rows.len(),
-            run.names.join(", ")
-        ))?;
+        let facts = Facts {
+            out: self.out.display().to_string(),
+            rows: run.rows.len(),
+            columns: &run.names,
+            rows_with_events: run.events.iter().filter(|event| !event.is_empty()).count(),
+        };
+        if self.json {
+            print_json(&facts)?;
+        } else {
+            let (columns, events) = (facts.columns.join(", "), facts.rows_with_events);
+            print(&format!(
+                "{}: {} rows of {columns}, events before {events} of them\n",
+                facts.out, facts.rows
+            ))?;
+        }
         outcome.extend(run.notes.iter().map(|note| format!("{log}: {note}")));
         Ok(outcome)
     }

@@ -14,9 +14,11 @@ use bowden_host_link::recorder::Tally;
 use bowden_host_link::rig_file::{self, Weight};
 use bowden_host_link::session::{RunEnd, Session};
 use bowden_host_link::{LinkError, ParameterSet};
+use serde::Serialize;
 
 use super::course::{CourseArguments, run_seconds};
 use super::port::{PortArguments, ReplugArguments};
+use super::{print, print_json};
 use crate::interrupt;
 
 /// Arguments of `bowden record`.
@@ -61,6 +63,19 @@ pub struct RecordArguments {
     /// Weight on the arm and its distance from the axis, for the rig file: the board does not know it
     #[arg(long, value_name = "KG,M", requires = "rig")]
     load: Option<Weight>,
+    /// Print JSON: one object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was recorded.
+#[derive(Serialize)]
+struct Facts {
+    out: String,
+    rows: u64,
+    duration_s: f64,
+    /// Time from one control tick to the next, us.
+    tick_us: f64,
 }
 
 impl RecordArguments {
@@ -167,12 +182,18 @@ impl RecordArguments {
         }
         outcome.extend(tally.absences().map(|absences| format!("{out}: {absences}")));
         outcome.extend(loss.map(|loss| format!("{out}: {loss}")));
-        super::print(&format!(
-            "{out}: {} rows over {:.3} s, tick {:.1} us\n",
-            tally.rows,
-            tally.duration_s(),
-            f64::from(tally.period_ns) * 1e-3
-        ))?;
+        let facts = Facts {
+            out: out.to_string(),
+            rows: tally.rows,
+            duration_s: tally.duration_s(),
+            tick_us: f64::from(tally.period_ns) * 1e-3,
+        };
+        if self.json {
+            print_json(&facts)?;
+        } else {
+            let Facts { rows, duration_s, tick_us, .. } = facts;
+            print(&format!("{out}: {rows} rows over {duration_s:.3} s, tick {tick_us:.1} us\n"))?;
+        }
         Ok(outcome)
     }
 }

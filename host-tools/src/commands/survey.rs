@@ -7,8 +7,9 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
 use bowden_core::survey::{PAGE, Plan, RigRule, survey};
+use serde::Serialize;
 
-use super::print;
+use super::{print, print_json};
 use crate::interrupt;
 use crate::progress::UntilInterrupted;
 
@@ -24,6 +25,31 @@ pub struct SurveyArguments {
     /// Folder for tables (Parquet), survey.html, and the results that a later run goes on from
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Print JSON: one object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What became of the recordings.
+#[derive(Serialize)]
+struct Facts<'a> {
+    recordings: usize,
+    /// Diagnosed in this run.
+    diagnosed: usize,
+    /// Diagnosed in a run before.
+    kept: usize,
+    failed: Vec<FailedRecording<'a>>,
+    /// Not reached, because the run was stopped.
+    left: usize,
+    took_s: f64,
+    page: String,
+}
+
+/// A recording without a diagnosis.
+#[derive(Serialize)]
+struct FailedRecording<'a> {
+    recording: &'a str,
+    reason: &'a str,
 }
 
 impl SurveyArguments {
@@ -39,15 +65,29 @@ impl SurveyArguments {
         let started = Instant::now();
         let summary = survey(&plan, &self.out, workers, &UntilInterrupted(progress))?;
         let took_s = started.elapsed().as_secs_f64();
-        print(&format!(
-            "{} recordings: {} diagnosed in {took_s:.0} s on {workers} threads, {} were done before, {} failed, {} left\n{}\n",
-            plan.tasks.len(),
-            summary.diagnosed,
-            summary.kept,
-            summary.failed.len(),
-            summary.left,
-            self.out.join(PAGE).display()
-        ))?;
+        let failed = |(recording, reason)| FailedRecording { recording, reason };
+        let facts = Facts {
+            recordings: plan.tasks.len(),
+            diagnosed: summary.diagnosed,
+            kept: summary.kept,
+            failed: summary.failed.iter().map(|(name, why)| failed((name.as_str(), why.as_str()))).collect(),
+            left: summary.left,
+            took_s,
+            page: self.out.join(PAGE).display().to_string(),
+        };
+        if self.json {
+            print_json(&facts)?;
+        } else {
+            print(&format!(
+                "{} recordings: {} diagnosed in {took_s:.0} s on {workers} threads, {} were done before, {} failed, {} left\n{}\n",
+                facts.recordings,
+                facts.diagnosed,
+                facts.kept,
+                facts.failed.len(),
+                facts.left,
+                facts.page
+            ))?;
+        }
         let mut outcome = Outcome::done();
         outcome.extend(
             summary.failed.iter().map(|(recording, message)| format!("{recording} failed: {message}")),

@@ -104,6 +104,14 @@ fn the_tool_reads_the_log_and_makes_a_recording_of_it() -> Outcome {
     assert_eq!(stderr, "bowden: run.rtt: the board started again 1 times; times go on behind those before\n");
     assert_eq!(status, Some(3));
     assert_eq!(stdout, "run.csv: 4 rows of tick, limits, longest, lost, events before 2 of them\n");
+    let again = ["import", "--defmt", "board.elf", "run.rtt", "--out", "again.csv", "--json"];
+    let (status, stdout, _) = bowden(folder.path(), &again)?;
+    assert_eq!(status, Some(3));
+    let facts: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
+    let columns = serde_json::json!(["tick", "limits", "longest", "lost"]);
+    let expected =
+        serde_json::json!({ "out": "again.csv", "rows": 4, "columns": columns, "rows_with_events": 2 });
+    assert_eq!(facts, expected);
     let table = std::fs::read_to_string(folder.path().join("run.csv")).expect("the recording");
     let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.splitn(6, ',').collect()).collect();
     let number = |row: usize, column: usize| rows[row][column].parse::<f64>().expect("a number");
