@@ -36,6 +36,7 @@ impl Recording {
             )));
         }
         let file = File::open(path).map_err(|error| unreadable(&error))?;
+        let length = file.metadata().map_err(|error| unreadable(&error))?.len();
         let mut file = BufReader::with_capacity(READ_BUFFER, file);
         let start = file.fill_buf().map_err(|error| unreadable(&error))?;
         let named_mcap = Format::of(path).is_some_and(|format| format == Format::Mcap);
@@ -45,7 +46,7 @@ impl Recording {
             )));
         }
         if start.starts_with(mcap::MAGIC) {
-            return mcap_file::read(file, source, options);
+            return mcap_file::read(file, length, source, options);
         }
         if start.starts_with(parquet_file::MAGIC) {
             return parquet_file::read(path, source, options);

@@ -6,6 +6,7 @@
 //! other topics are passed over: they take no part in anything and are not copied when the recording is written elsewhere,
 //! which [`Recording::topics_passed_over`] tells.
 
+mod lengths;
 mod records;
 mod row;
 mod schema;
@@ -26,6 +27,7 @@ use super::ros2::Bag;
 use super::{ReadOptions, Recording};
 use crate::outcome::Failure;
 
+pub(super) use lengths::parse_record;
 pub(super) use records::Records;
 pub(super) use row::Row;
 pub(super) use schema::units_of;
@@ -43,14 +45,19 @@ pub(super) const RECORD_LIMIT: usize = 1 << 28;
 /// Samples of a chunk before compression, bytes: what a damaged byte costs.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// Reads the samples as they stream past.
-pub(super) fn read(data: impl Read, source: String, options: &ReadOptions) -> Result<Recording, Failure> {
+/// Reads the samples of a file of `length` bytes as they stream past.
+pub(super) fn read(
+    data: impl Read,
+    length: u64,
+    source: String,
+    options: &ReadOptions,
+) -> Result<Recording, Failure> {
     let mut origin = Origin::new(source, Places::messages());
     let mut other_topics = BTreeSet::new();
     let mut table: Option<Table> = None;
     let mut number = 0;
     let mut bag = Bag::new(options);
-    let mut records = Records::new(data);
+    let mut records = Records::new(data, length);
     let mut channels = ChannelAccumulator::default();
     loop {
         let damaged = |error: McapError| {

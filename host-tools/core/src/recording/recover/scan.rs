@@ -10,7 +10,7 @@ use mcap::records::{Record, op};
 
 use super::shorten;
 use super::sink::{Sink, Stopped};
-use crate::recording::mcap_file::{RECORD_LIMIT, Records, Row, SCHEMA, TOPIC, units_of};
+use crate::recording::mcap_file::{RECORD_LIMIT, Records, Row, SCHEMA, TOPIC, parse_record, units_of};
 
 /// Opcode and length of a record, bytes.
 const HEAD: u64 = 9;
@@ -164,7 +164,7 @@ impl<R: Read + Seek, W: Write + Seek> Scan<'_, R, W> {
                     }
                     Chunk::Inconsistent => false,
                 },
-                Some((opcode, body)) => match mcap::parse_record(opcode, &body) {
+                Some((opcode, body)) => match parse_record(opcode, &body) {
                     Ok(Record::DataEnd(end)) => {
                         self.data_end = Some((at, end.data_section_crc));
                         true
@@ -297,9 +297,7 @@ impl<R: Read + Seek, W: Write + Seek> Scan<'_, R, W> {
             return Ok(false);
         }
         let next = self.record(at + HEAD + 4)?;
-        Ok(next.is_some_and(|(opcode, body)| {
-            opcode != op::DATA_END && mcap::parse_record(opcode, &body).is_ok()
-        }))
+        Ok(next.is_some_and(|(opcode, body)| opcode != op::DATA_END && parse_record(opcode, &body).is_ok()))
     }
 
     /// Bytes of the file; none if it ends before.
@@ -315,7 +313,7 @@ impl<R: Read + Seek, W: Write + Seek> Scan<'_, R, W> {
 
     /// Whether the summary before a footer is the one that was written, and the file ends behind it.
     fn summary_is_whole(&mut self, at: u64, footer: &[u8]) -> Result<bool, Stopped> {
-        let Ok(Record::Footer(footer)) = mcap::parse_record(op::FOOTER, footer) else { return Ok(false) };
+        let Ok(Record::Footer(footer)) = parse_record(op::FOOTER, footer) else { return Ok(false) };
         // All of the footer but the CRC itself.
         let end = at + HEAD + 16;
         if self.bytes(end + 4, mcap::MAGIC.len() as u64)?.as_deref() != Some(mcap::MAGIC) {
@@ -374,7 +372,7 @@ fn chunk(body: &[u8]) -> Chunk {
     let mut head = [0; HEAD as usize];
     head[0] = op::CHUNK;
     head[1..].copy_from_slice(&(body.len() as u64).to_le_bytes());
-    let mut records = Records::of_chunk(head.chain(body));
+    let mut records = Records::of_chunk(head.chain(body), body.len() as u64);
     let mut whole = Vec::new();
     loop {
         match records.next() {
