@@ -20,6 +20,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
 use super::build::Table;
+use super::guarded::guarded;
 use super::origin::Origin;
 use super::place::Places;
 use super::{Column, ReadOptions, Recording, TIME_ROLE, TextColumn};
@@ -33,6 +34,9 @@ const GROUP: usize = 1 << 18;
 
 /// Rows that are read at once.
 const BATCH: usize = 1 << 12;
+
+/// Rows that a byte of a file may hold: times rise, so that every row takes some bits. A count beyond it is damage.
+const ROWS_A_BYTE: u64 = 100;
 
 /// Name of the schema's root.
 const ROOT: &str = "bowden_recording";
@@ -152,7 +156,10 @@ fn key_values(recording: &Recording) -> Vec<KeyValue> {
 /// Reads a file.
 pub(super) fn read(path: &Path, source: String, options: &ReadOptions) -> Result<Recording, Failure> {
     let mut origin = Origin::new(source, Places::samples());
-    let table = try_read(path, &mut origin, options).map_err(|error| {
+    // The library panics where parts of a damaged file contradict each other.
+    let table = guarded(|| try_read(path, &mut origin, options))
+        .unwrap_or_else(|panic| Err(Unreadable::Damaged(panic)));
+    let table = table.map_err(|error| {
         let (source, reason) = (&origin.source, error.reason());
         Failure::bad_input(format!("{source}: {reason}; copy or convert the file again"))
     })?;
@@ -162,6 +169,7 @@ pub(super) fn read(path: &Path, source: String, options: &ReadOptions) -> Result
 /// Why a file cannot be read.
 enum Unreadable {
     Parquet(ParquetError),
+    Damaged(String),
     Row(String),
 }
 
@@ -169,6 +177,9 @@ impl Unreadable {
     fn reason(&self) -> String {
         match self {
             Self::Parquet(error) => format!("not readable as Parquet: {error}"),
+            Self::Damaged(reason) => {
+                format!("not readable as Parquet: its parts contradict each other ({reason})")
+            }
             Self::Row(reason) => reason.clone(),
         }
     }
@@ -187,7 +198,9 @@ impl From<io::Error> for Unreadable {
 }
 
 fn try_read(path: &Path, origin: &mut Origin, options: &ReadOptions) -> Result<Table, Unreadable> {
-    let file = SerializedFileReader::new(File::open(path)?)?;
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let file = SerializedFileReader::new(file)?;
     let metadata = file.metadata().file_metadata();
     for KeyValue { key, value } in metadata.key_value_metadata().into_iter().flatten() {
         let value = value.clone().unwrap_or_default();
@@ -206,9 +219,18 @@ fn try_read(path: &Path, origin: &mut Origin, options: &ReadOptions) -> Result<T
         return Err(Unreadable::Row(format!("column `{}` is nested, expected a plain table", nested.path())));
     }
     let mut table = Table::from_header(&names, options).map_err(Unreadable::Row)?;
+    let rows = metadata.num_rows();
+    if u64::try_from(rows).map_or(true, |rows| rows > length.saturating_mul(ROWS_A_BYTE)) {
+        return Err(Unreadable::Row(format!(
+            "the index counts {rows} rows in {length} bytes, which cannot be"
+        )));
+    }
     for index in 0..file.num_row_groups() {
         let group = file.get_row_group(index)?;
-        let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+        let counted = group.metadata().num_rows();
+        let rows = usize::try_from(counted).ok().filter(|_| counted <= rows).ok_or_else(|| {
+            Unreadable::Row(format!("a part of the table counts {counted} rows, the whole {rows}"))
+        })?;
         let mut columns = Vec::with_capacity(names.len());
         for (column, name) in names.iter().enumerate() {
             columns.push(read_column(group.get_column_reader(column)?, rows, name)?);
@@ -227,12 +249,18 @@ fn read_column(reader: ColumnReader, rows: usize, name: &str) -> Result<Vec<Vec<
     macro_rules! cells {
         ($reader:ident, $text:expr) => {{
             let mut reader = $reader;
-            let mut cells = Vec::with_capacity(rows);
+            let mut cells = Vec::with_capacity(rows.min(GROUP));
             let mut levels = Vec::new();
             loop {
                 let mut values = Vec::new();
                 levels.clear();
                 let (records, _, _) = reader.read_records(BATCH, Some(&mut levels), None, &mut values)?;
+                if cells.len() + records > rows || (records == 0 && cells.len() < rows) {
+                    let got = cells.len() + records;
+                    return Err(Unreadable::Row(format!(
+                        "column `{name}` has {got} values, expected {rows} as the index counts"
+                    )));
+                }
                 if records == 0 {
                     break cells;
                 }
