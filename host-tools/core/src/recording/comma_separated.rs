@@ -198,6 +198,14 @@ impl<W: Write> Writer<W> {
     pub(super) fn new<'c>(columns: impl IntoIterator<Item = &'c str>, out: W) -> io::Result<Self> {
         let mut table = csv::WriterBuilder::new().buffer_capacity(READ_BUFFER).from_writer(out);
         let columns: Vec<String> = columns.into_iter().map(str::to_owned).collect();
+        for name in &columns {
+            if let Some(what) = unkept(name, true) {
+                let name = name.escape_default();
+                return Err(io::Error::other(format!(
+                    "the column's name `{name}` holds a {what}, which a table cannot keep"
+                )));
+            }
+        }
         table.write_field(TIME_ROLE)?;
         for column in &columns {
             table.write_field(column)?;
@@ -213,9 +221,9 @@ impl<W: Write> Writer<W> {
             match cell {
                 Cell::Number(value) => self.write_number(format_args!("{value:?}"))?,
                 Cell::Integer(value) => self.write_number(format_args!("{value}"))?,
-                Cell::Text(cell) if cell.contains('\n') => {
+                Cell::Text(cell) if let Some(what) = unkept(cell, index + 1 == self.columns.len()) => {
                     let name = self.columns.get(index).map_or("", String::as_str);
-                    let reason = format!("column `{name}` holds a line break, which a table cannot keep");
+                    let reason = format!("column `{name}` holds a {what}, which a table cannot keep");
                     return Err(io::Error::other(reason));
                 }
                 Cell::Text(cell) => self.table.write_field(cell)?,
@@ -240,5 +248,43 @@ impl<W: Write> Writer<W> {
         self.cell.write_fmt(number)?;
         self.table.write_field(&self.cell)?;
         Ok(())
+    }
+}
+
+/// What of a text would be read back as something else: lines end at a line feed, the last cell's carriage return belongs to the line's
+/// end, and a zero byte tells that a file is no text.
+fn unkept(text: &str, last: bool) -> Option<&'static str> {
+    if text.contains('\n') || (last && text.ends_with('\r')) {
+        Some("line break")
+    } else if text.contains('\0') {
+        Some("zero byte")
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_that_would_read_back_as_another_is_refused() {
+        let write = |columns: [&'static str; 2], cells: [&str; 2]| {
+            let mut writer = Writer::new(columns, Vec::new())?;
+            writer.row(0.5, cells.map(Cell::Text))?;
+            writer.finish().map(|table| String::from_utf8(table).unwrap())
+        };
+        let refused = |columns, cells| write(columns, cells).unwrap_err().to_string();
+        assert_eq!(write(["a", "b"], ["x\ry", "z"]).unwrap(), "t_s,a,b\n0.5,\"x\ry\",z\n");
+        assert_eq!(write(["a", "b"], ["x\r", "z"]).unwrap(), "t_s,a,b\n0.5,\"x\r\",z\n");
+        let a_break = "column `b` holds a line break, which a table cannot keep";
+        assert_eq!(refused(["a", "b"], ["x", "z\r"]), a_break);
+        assert_eq!(refused(["a", "b"], ["x", "y\nz"]), a_break);
+        assert_eq!(
+            refused(["a", "b"], ["\0", "z"]),
+            "column `a` holds a zero byte, which a table cannot keep"
+        );
+        let name = "the column's name `b\\n` holds a line break, which a table cannot keep";
+        assert_eq!(refused(["a", "b\n"], ["x", "z"]), name);
     }
 }
