@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Metadata, Places, Recording, build};
-use crate::outcome::Failure;
+use crate::outcome::{Failure, one_line};
 
 /// What readers share: a recording under construction.
 pub(super) struct Origin {
@@ -42,7 +42,8 @@ impl Origin {
             t_s: Arc::new(t_s),
             columns,
             places: self.places,
-            notes: self.notes,
+            // Names of columns and topics come from the file.
+            notes: self.notes.iter().map(one_line).collect(),
             passed_over: self.passed_over,
             metadata: self.metadata,
             units: self.units,

@@ -17,7 +17,7 @@ use std::path::Path;
 
 use self::sink::Sink;
 use super::{Format, Metadata, READ_BUFFER};
-use crate::outcome::Failure;
+use crate::outcome::{Failure, one_line};
 use crate::output;
 
 /// What was taken out of a file.
@@ -94,7 +94,9 @@ pub fn recover(path: &Path, out: &Path) -> Result<Recovered, Failure> {
         Err(of_input) if !of_input.message().is_empty() => of_input.clone(),
         _ => failure,
     })?;
-    let recovered = recovered?;
+    let mut recovered = recovered?;
+    // Names of topics come from the file.
+    recovered.missing.iter_mut().for_each(|line| *line = one_line(line));
     if let Some(beside) = Metadata::file_beside(out).filter(|_| !recovered.metadata.is_empty()) {
         output::write_file(&beside, |file| file.write_all(recovered.metadata.to_toml().as_bytes()))?;
     }

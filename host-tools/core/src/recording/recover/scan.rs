@@ -9,7 +9,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use mcap::records::{Record, op};
 
 use super::shorten;
-use super::sink::{Sink, Stopped};
+use super::sink::{Sink, Stopped, twice};
 use crate::recording::mcap_file::{RECORD_LIMIT, Records, Row, SCHEMA, TOPIC, parse_record, units_of};
 
 /// Opcode and length of a record, bytes.
@@ -219,7 +219,12 @@ impl<R: Read + Seek, W: Write + Seek> Scan<'_, R, W> {
             return Ok(());
         };
         if self.sink.names().is_empty() {
-            self.sink.header(row.names().map(str::to_owned).collect())?;
+            let names: Vec<String> = row.names().map(str::to_owned).collect();
+            if twice(&names).is_some() {
+                self.unusable += 1;
+                return Ok(());
+            }
+            self.sink.header(names)?;
         }
         let same = row.names().eq(self.sink.names().iter().map(String::as_str));
         let cells = row.cells().unwrap_or_default();

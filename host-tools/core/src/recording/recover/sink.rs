@@ -1,7 +1,7 @@
 //! Where whole rows go.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Seek, Write};
 
 use bowden_model::channel::Channel;
@@ -76,6 +76,11 @@ impl<W: Write + Seek> Sink<W> {
                 "no column `{TIME_ROLE}` in the first whole row; name the time in seconds so, or recover a recording of this program"
             )));
         };
+        if let Some(name) = twice(&names) {
+            return Err(Stopped::Input(format!(
+                "column `{name}` stands twice in the header, which is damaged; put one from another recording before the rows"
+            )));
+        }
         self.time = time;
         let columns: Vec<RowColumn> = names
             .iter()
@@ -134,4 +139,10 @@ impl<W: Write + Seek> Sink<W> {
         }
         Ok(Recovered { rows: self.rows, span_s: self.span_s, missing, metadata: self.metadata })
     }
+}
+
+/// The first name that stands twice, as a reader of the output sees names: without blanks around them.
+pub fn twice(names: &[String]) -> Option<&str> {
+    let mut seen = BTreeSet::new();
+    names.iter().map(|name| name.trim()).find(|name| !seen.insert(*name))
 }
