@@ -10,6 +10,7 @@ mod debian;
 mod demo;
 mod files;
 mod firmware;
+mod fuzz;
 mod image_size;
 mod memory_map;
 mod paper;
@@ -49,6 +50,8 @@ enum Task {
     Prove(prove::Options),
     /// Run the experiments of the paper on the virtual bench and write host-tools/docs/paper.md; `paper --help` lists options
     Paper(paper::Options),
+    /// Run the fuzz targets under libFuzzer; `fuzz --help` lists options
+    Fuzz(fuzz::Options),
     /// Build the release images for the driver board and print what they take of its memory
     Firmware,
     /// Run clippy on everything, the board's images among it; warnings are errors
@@ -62,6 +65,7 @@ fn main() -> ExitCode {
         Ok(Cli { task: Task::Bench(options) }) => bench::run(&options),
         Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
         Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),
+        Ok(Cli { task: Task::Fuzz(options) }) => fuzz::run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
         Ok(Cli { task: Task::Clippy }) => clippy::run(),
         Err(error) => return usage(&error),
@@ -91,7 +95,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         .collect();
     let what = what.join(" ");
     eprintln!(
-        "xtask: {}; the tasks are demo, test, bench, prove, paper, firmware and clippy, see `cargo xtask --help`",
+        "xtask: {}; the tasks are demo, test, bench, prove, paper, fuzz, firmware and clippy, see `cargo xtask --help`",
         what.strip_prefix("error: ").unwrap_or(&what)
     );
     ExitCode::from(2)
