@@ -65,7 +65,7 @@ impl<R: Read> Records<R> {
 /// Largest record, packed or unpacked, that is read from a file of `length` bytes: the reader makes room for it before it comes.
 fn limit(length: u64) -> usize {
     /// What any chunk may be, bytes; writers make them of some megabytes.
-    const LEAST: u64 = 1 << 24;
+    const LEAST: u64 = 1 << 22;
     /// How often a table may be longer than its compressed form.
     const DENSEST: u64 = 1000;
     length.saturating_mul(DENSEST).clamp(LEAST, RECORD_LIMIT as u64) as usize
