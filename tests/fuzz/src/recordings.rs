@@ -1,5 +1,6 @@
 //! Recordings of every format, and what `bowden recover` makes of them.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -140,7 +141,7 @@ fn with_messages(
     let mut file = options.create(Cursor::new(Vec::new())).expect("memory takes everything");
     let schema = file.add_schema(schema, encoding, b"{}").expect("memory takes everything");
     let channel = file
-        .add_channel(schema, topic, message_encoding, &Default::default())
+        .add_channel(schema, topic, message_encoding, &BTreeMap::default())
         .expect("memory takes everything");
     for (n, message) in (0..).zip(messages) {
         let time = u64::from(n) * 1_000_000;
