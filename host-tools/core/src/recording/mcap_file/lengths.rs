@@ -105,7 +105,8 @@ mod tests {
             for changed in texts {
                 let mut parts = parts.clone();
                 parts[*changed][..4].copy_from_slice(&0x6569_6669_u32.to_le_bytes());
-                let refused = parse_record(opcode, &parts.concat());
+                let body = parts.concat();
+                let refused = parse_record(opcode, &body);
                 assert!(
                     matches!(refused, Err(McapError::RecordTooLarge { len: 0x6569_6669, .. })),
                     "{opcode}: {refused:?}"
