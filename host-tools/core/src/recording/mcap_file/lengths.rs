@@ -92,7 +92,9 @@ mod tests {
         let map = [&(pairs.len() as u32).to_le_bytes()[..], &pairs].concat();
         let zeros = |count: usize| vec![0; count];
         let none = 0_u32.to_le_bytes().to_vec();
-        let cases: [(u8, Vec<Vec<u8>>, &[usize]); 6] = [
+        /// Opcode, parts of the record, and which of them are texts.
+        type Case = (u8, Vec<Vec<u8>>, &'static [usize]);
+        let cases: [Case; 6] = [
             (op::HEADER, vec![text("profile"), text("library")], &[0, 1]),
             (op::SCHEMA, vec![vec![1, 0], text("name"), text("json"), none.clone()], &[1, 2]),
             (op::CHANNEL, vec![vec![1, 0, 0, 0], text("/topic"), text("json"), map.clone()], &[1, 2, 3]),
