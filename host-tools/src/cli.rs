@@ -68,6 +68,8 @@ enum Command {
     Monitor(crate::commands::monitor::MonitorArguments),
     /// Excite, diagnose, correct and verify the joint on a driver board, all in one
     Investigate(crate::commands::investigate::InvestigateArguments),
+    /// Measure zeros, gains, wiring, encoders, pretension and motor of a driver board, one question at a time
+    Calibrate(crate::commands::calibrate::CalibrateArguments),
     /// Show, change, load, save and store the parameters of a driver board
     Params(crate::commands::params::ParamsArguments),
     /// Show the fault of a driver board, what led to it, and clear it
@@ -134,6 +136,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
         Command::Run(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
         Command::Monitor(arguments) => arguments.run(),
         Command::Investigate(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),
+        Command::Calibrate(arguments) => arguments.run(),
         Command::Params(arguments) => arguments.run(),
         Command::Faults(arguments) => arguments.run(),
         Command::Flash(arguments) => arguments.run(progress::for_stderr(cli.quiet).as_ref()),

@@ -1,5 +1,6 @@
 //! The subcommands, one file each: arguments, checks of what they name, a library call, and what is printed.
 
+pub mod calibrate;
 pub mod check;
 pub mod convert;
 mod course;

@@ -41,13 +41,19 @@ pub fn hexadecimal(bytes: &[u8]) -> String {
         .collect()
 }
 
+/// Time now, UTC, as recordings have it.
+#[must_use]
+pub fn utc_now() -> String {
+    jiff::Timestamp::now().to_string()
+}
+
 /// Both clocks of the host.
 ///
 /// The monotonic one has no date and never jumps: within one `boot`, it tells the time between two recordings.
 fn clocks(when: &str) -> Vec<(String, String)> {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
     let mut entries = vec![
-        (format!("{when}_utc"), jiff::Timestamp::now().to_string()),
+        (format!("{when}_utc"), utc_now()),
         (format!("{when}_monotonic_s"), format!("{}.{:09}", now.tv_sec, now.tv_nsec)),
     ];
     if when == "started"

@@ -15,6 +15,7 @@
 //! | [`replug`] | a board that was unplugged and comes back |
 //! | [`course`] | what the joint is to follow |
 //! | [`bench_run`] | a bench run as a file |
+//! | [`calibrate`] | zeros, gains, wiring, encoders, motor and pretension, one question at a time |
 //! | [`investigate`] | excites, diagnoses, corrects and verifies a joint |
 //! | [`conversion`], [`recorder`], [`capture`], [`rig_file`] | raw samples to a recording and the rig that goes with it |
 //! | [`evidence`] | what a recording says of itself |
@@ -24,6 +25,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bench_run;
+pub mod calibrate;
 pub mod capture;
 pub mod client;
 pub mod conversion;
@@ -62,6 +64,7 @@ use bowden_core::diagnose;
 
 use std::time::Duration;
 
+use calibrate::hand::{Hand, Person};
 pub use client::{Client, Telemetry};
 pub use error::{CommsError, LinkError};
 pub use losses::Losses;
@@ -90,6 +93,20 @@ pub fn connect(port: &str, timeout: Duration) -> Result<Client, LinkError> {
     match simulated(port)? {
         Some(board) => Client::connect(Box::new(board), SIM, timeout),
         None => connect_serial(port, timeout),
+    }
+}
+
+/// As [`connect`], with who acts at the bench: a person, or a hand at the bench of a simulated board.
+///
+/// # Errors
+/// As [`connect`].
+pub fn connect_with_hand(port: &str, timeout: Duration) -> Result<(Client, Box<dyn Hand>), LinkError> {
+    match simulated(port)? {
+        Some(board) => {
+            let hand = board.hand();
+            Ok((Client::connect(Box::new(board), SIM, timeout)?, Box::new(hand)))
+        }
+        None => Ok((connect_serial(port, timeout)?, Box::new(Person))),
     }
 }
 

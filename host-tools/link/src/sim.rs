@@ -6,19 +6,24 @@
 
 mod board;
 mod concealed;
+mod hand;
 mod joint;
+mod wiring;
 
+use std::cell::RefCell;
 use std::io;
+use std::rc::Rc;
 use std::time::Duration;
 
 use super::error::CommsError;
 use super::transport::Transport;
 use board::SimBoard;
 pub use concealed::Concealed;
+pub use hand::SimHand;
 
 /// A simulated board at the other end.
 pub struct SimTransport {
-    board: SimBoard,
+    board: Rc<RefCell<SimBoard>>,
 }
 
 impl SimTransport {
@@ -41,7 +46,13 @@ impl SimTransport {
             reason: error.to_string(),
             next: "conceal something else".into(),
         })?;
-        Ok(Self { board })
+        Ok(Self { board: Rc::new(RefCell::new(board)) })
+    }
+
+    /// A hand at its bench.
+    #[must_use]
+    pub fn hand(&self) -> SimHand {
+        SimHand::new(Rc::clone(&self.board))
     }
 }
 
@@ -53,21 +64,23 @@ impl Default for SimTransport {
 
 impl Transport for SimTransport {
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        let end = self.board.now() + timeout;
-        while self.board.is_silent() && self.board.now() < end {
-            self.board.tick();
+        let mut board = self.board.borrow_mut();
+        let end = board.now() + timeout;
+        while board.is_silent() && board.now() < end {
+            board.tick();
         }
-        Ok(self.board.send_into(buffer))
+        Ok(board.send_into(buffer))
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut board = self.board.borrow_mut();
         // A tick passes while they are on the way.
-        self.board.tick();
-        self.board.receive(bytes);
+        board.tick();
+        board.receive(bytes);
         Ok(())
     }
 
     fn now(&self) -> Duration {
-        self.board.now()
+        self.board.borrow().now()
     }
 }

@@ -1,10 +1,8 @@
 //! `bowden investigate`: the whole round on a joint by itself: excite, diagnose, correct, verify.
 
 use std::fs;
-use std::io::{self, BufRead, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
-use std::time::Duration;
 
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
@@ -17,9 +15,6 @@ use super::port::PortArguments;
 use super::print;
 use crate::interrupt;
 use crate::progress::UntilInterrupted;
-
-/// Time between two looks whether the user pressed Ctrl-C instead of answering.
-const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Arguments of `bowden investigate`.
 #[derive(Clone, Debug, clap::Args)]
@@ -77,30 +72,8 @@ impl Dialog for AtTerminal {
 
     fn may(&self, question: &str) -> Result<bool, Failure> {
         self.show(&format!("{question} [y/N] "))?;
-        // Reading a line cannot be interrupted, so another thread does it and this one looks for Ctrl-C.
-        let (sender, answer) = mpsc::channel();
-        std::thread::spawn(move || {
-            let mut line = String::new();
-            let read = io::stdin().lock().read_line(&mut line).map(|_| line);
-            let _ = sender.send(read);
-        });
-        loop {
-            if interrupt::requested() {
-                self.show("\n")?;
-                return Err(Failure::failed("stopped by the user"));
-            }
-            match answer.recv_timeout(LOOK_INTERVAL) {
-                Ok(Ok(line)) => return Ok(matches!(line.trim().to_lowercase().as_str(), "y" | "yes")),
-                Ok(Err(error)) => {
-                    let reason = output::describe(&error);
-                    return Err(Failure::failed(format!(
-                        "standard input: cannot be read: {reason}; use --yes"
-                    )));
-                }
-                Err(mpsc::RecvTimeoutError::Timeout) => {}
-                Err(mpsc::RecvTimeoutError::Disconnected) => return Ok(false),
-            }
-        }
+        let line = interrupt::read_line()?;
+        Ok(line.is_some_and(|line| matches!(line.trim().to_lowercase().as_str(), "y" | "yes")))
     }
 }
 

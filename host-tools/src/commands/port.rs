@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bowden_host_link::calibrate::hand::Hand;
 use bowden_host_link::replug::Replug;
 use bowden_host_link::{Client, LinkError};
 
@@ -37,6 +38,14 @@ impl PortArguments {
     /// See [`bowden_host_link::connect`].
     pub fn connect(&self) -> Result<Client, LinkError> {
         bowden_host_link::connect(&self.port, self.timeout)
+    }
+
+    /// The same, with who acts at the bench.
+    ///
+    /// # Errors
+    /// See [`bowden_host_link::connect_with_hand`].
+    pub fn connect_with_hand(&self) -> Result<(Client, Box<dyn Hand>), LinkError> {
+        bowden_host_link::connect_with_hand(&self.port, self.timeout)
     }
 
     /// The same; a simulated board then runs in real time.

@@ -71,6 +71,7 @@ mod controller;
 mod draw;
 mod effects;
 mod error;
+mod hand;
 mod live;
 mod motion;
 mod plant;

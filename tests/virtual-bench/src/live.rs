@@ -27,6 +27,7 @@ pub struct LiveBench {
     noise: Draw,
     supply_v: f64,
     largest_wrap_angle_rad: f64,
+    cell_load_n: [f64; 4],
     steps: u64,
 }
 
@@ -48,6 +49,7 @@ impl LiveBench {
             noise: Draw::new(seed, "live sensor noise"),
             supply_v: config.supply_v,
             largest_wrap_angle_rad: config.largest_wrap_angle_rad(),
+            cell_load_n: [0.0; 4],
             steps: 0,
             config: config.clone(),
         })
@@ -118,6 +120,28 @@ impl LiveBench {
         self.plant.set_outer_torque_nm(torque_nm);
     }
 
+    /// Takes both tendons off their pulleys (`false`), or fits them as on a bench that was just built: at pretension, at rest, all
+    /// angles zero. Hands let go of everything.
+    pub fn set_tendons_fitted(&mut self, fitted: bool) {
+        self.cell_load_n = [0.0; 4];
+        self.plant.set_tendons_fitted(fitted);
+    }
+
+    /// Loads cells f1 to f4 by hand or with a weight \[N\], beside what their tendons do, until it is set anew.
+    pub fn set_cell_load_n(&mut self, load_n: [f64; 4]) {
+        self.cell_load_n = load_n;
+    }
+
+    /// Turns the shaft of the input pulley by hand to this angle \[rad\] and holds it; none lets go.
+    pub fn hold_input(&mut self, angle_rad: Option<f64>) {
+        self.plant.hands().input_rad = angle_rad;
+    }
+
+    /// Turns the arm by hand to this angle \[rad\] and holds it, as far as its weight lets a hand; none lets go.
+    pub fn hold_arm(&mut self, angle_rad: Option<f64>) {
+        self.plant.hands().arm_rad = angle_rad;
+    }
+
     /// Moves the sheaths: sets the wrap angle K of cable a and b \[rad\], each bend keeping its share.
     ///
     /// Only the bend angles change: neither the length of a sheath nor what `bending_friction` preloads.
@@ -166,7 +190,8 @@ impl LiveBench {
     /// Tension \[N\] or current \[A\] that the amplifier of `channel` gives out, with noise and sensor effects, neither
     /// limited nor quantised. Each call draws new noise. Encoder channels read 0.
     pub fn sensed(&mut self, channel: Channel) -> f64 {
-        let [f1, f2, f3, f4] = self.tensions_n();
+        let tensions_n = self.tensions_n();
+        let [f1, f2, f3, f4] = std::array::from_fn(|cell| tensions_n[cell] + self.cell_load_n[cell]);
         let (mut value, noise) = match channel {
             Channel::F1 => (f1, self.config.tension_noise_n),
             Channel::F2 => (f2, self.config.tension_noise_n),
@@ -310,6 +335,30 @@ mod tests {
         // Before anything moves, the current is V/R·(1 − e^(−t R/L)): proportional to the supply.
         let ratio = settle(12.0) / settle(24.0);
         assert!((ratio - 0.5).abs() < 0.02, "{ratio}");
+    }
+
+    #[test]
+    fn without_tendons_each_shaft_turns_alone_and_cells_feel_what_hangs_on_them() {
+        let config = BenchConfig { tension_noise_n: 0.0, ..BenchConfig::default() };
+        let mut bench = LiveBench::new(&config, &[], 1).expect("default bench");
+        bench.set_tendons_fitted(false);
+        bench.hold_input(Some(0.5));
+        bench.set_cell_load_n([0.0, 19.62, 0.0, 0.0]);
+        let run = |bench: &mut LiveBench| (0..100_000).for_each(|_| bench.step(Bridge::Open));
+        run(&mut bench);
+        assert!((bench.theta_in_rad() - 0.5).abs() < 1e-3 && bench.theta_out_rad() == 0.0);
+        let sensed = [Channel::F1, Channel::F2, Channel::F3, Channel::F4].map(|cell| bench.sensed(cell));
+        assert_eq!(sensed, [0.0, 19.62, 0.0, 0.0]);
+        bench.hold_input(None);
+        bench.hold_arm(Some(0.5));
+        run(&mut bench);
+        // A hand of 2 N·m/rad against m g l sin: 2·(0.5 − x) = 0.73575·sin x.
+        assert!((2.0 * (0.5 - bench.theta_out_rad()) - 0.735_75 * bench.theta_out_rad().sin()).abs() < 1e-3);
+        bench.set_tendons_fitted(true);
+        run(&mut bench);
+        let new = LiveBench::new(&config, &[], 1).expect("default bench").tensions_n();
+        let fitted = bench.tensions_n();
+        assert!((0..4).all(|cell| (fitted[cell] - new[cell]).abs() < 1e-9), "{fitted:?}");
     }
 
     #[test]

@@ -9,6 +9,7 @@
 use crate::bristle::ShaftBristle;
 use crate::config::BenchConfig;
 use crate::effects::{ActiveEffects, AsymmetricFriction, TransmissionLaw};
+use crate::hand::{self, Hands};
 use crate::sheath;
 use crate::tendon::{Contact, Material, Tendon};
 
@@ -107,6 +108,7 @@ pub(crate) struct Plant {
     pretension_ratio: [f64; 2],
     /// Torque on the arm from outside, towards +θ \[Nm\].
     outer_nm: f64,
+    hands: Hands,
 }
 
 impl Plant {
@@ -162,6 +164,7 @@ impl Plant {
             clock_start_s,
             pretension_ratio: [1.0; 2],
             outer_nm: 0.0,
+            hands: Hands::default(),
         };
         plant.update_tensions();
         plant
@@ -208,6 +211,30 @@ impl Plant {
         self.outer_nm = torque_nm;
     }
 
+    /// What hands do.
+    pub(crate) fn hands(&mut self) -> &mut Hands {
+        &mut self.hands
+    }
+
+    /// Takes the tendons off their pulleys, or fits them: all shafts then stand at angle zero, as on a bench that was just built.
+    pub(crate) fn set_tendons_fitted(&mut self, fitted: bool) {
+        if fitted {
+            let tendon = Tendon::new(&self.config);
+            for (place, bend_rad) in self.tendons.iter_mut().zip(&self.nominal_bend_rad) {
+                *place = tendon.clone();
+                place.bend_rad.clone_from(bend_rad);
+            }
+            (self.rotor, self.input, self.drum) = Default::default();
+            (self.output, self.arm) = Default::default();
+            self.current_a = 0.0;
+        } else {
+            for tendon in &mut self.tendons {
+                tendon.tension_n.fill(0.0);
+            }
+        }
+        self.hands = Hands { tendons_off: !fitted, ..Hands::default() };
+    }
+
     /// Sets the wrap angle K of the sheaths of cable a and b \[rad\]; each bend keeps its share.
     pub(crate) fn set_wrap_angle_rad(&mut self, wrap_angle_rad: [f64; 2]) {
         for ((tendon, nominal), wrap) in
@@ -232,8 +259,10 @@ impl Plant {
 
     fn step_bridge(&mut self, duty: Option<f64>) {
         let dt = self.config.step_s;
-        self.update_bends();
-        self.update_tensions();
+        if !self.hands.tendons_off {
+            self.update_bends();
+            self.update_tensions();
+        }
         let [input_radius_m, output_radius_m] = self.radii_m();
         let input_nm = (self.tendons[0].input_n() - self.tendons[1].input_n()) * input_radius_m;
         let output_nm = (self.tendons[0].output_n() - self.tendons[1].output_n()) * output_radius_m;
@@ -259,7 +288,9 @@ impl Plant {
         self.drum.advance(drum_nm - input_nm, self.config.input_drum_inertia_kg_m2, dt);
         self.output.advance(output_nm - arm_nm, self.config.output_pulley_inertia_kg_m2, dt);
         self.advance_arm(arm_nm, dt);
-        self.advance_tendons(dt);
+        if !self.hands.tendons_off {
+            self.advance_tendons(dt);
+        }
         self.steps += 1;
         self.clock_s = self.clock_start_s + self.steps as f64 * dt;
     }
@@ -331,7 +362,8 @@ impl Plant {
         let viscous_nm = (self.config.motor_viscous_nm_s_per_rad + extra) * self.input.omega_rad_per_s;
         let inertia = self.rotor_inertia_kg_m2();
         self.rotor.advance(rotor_nm, inertia, dt);
-        self.input.advance(gear_nm - drum_nm - viscous_nm, self.config.input_shaft_inertia_kg_m2, dt);
+        let hand_nm = hand::torque_nm(self.hands.input_rad, self.input);
+        self.input.advance(gear_nm - drum_nm - viscous_nm + hand_nm, self.config.input_shaft_inertia_kg_m2, dt);
         gear_nm
     }
 
@@ -347,6 +379,7 @@ impl Plant {
         let viscous = self.config.joint_viscous_nm_s_per_rad + extra_viscous;
         let mut torque = hub_nm - weight_n * lever_m * arm.angle_rad.sin() - viscous * arm.omega_rad_per_s;
         torque += self.outer_nm;
+        torque += hand::torque_nm(self.hands.arm_rad, arm);
         if let Some(law) = &effects.joint_coulomb_friction {
             torque -= law.torque_nm(&mut self.state.joint_coulomb, arm.omega_rad_per_s, dt);
         }

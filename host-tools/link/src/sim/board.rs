@@ -13,7 +13,7 @@ use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
 use bowden_link::message::{Boot, Chip, Provocation, Refusal};
 use bowden_link::sample::{Order, WordRaw};
 use bowden_link::{Answer, Fault, FromBoard, Inputs, RawTick, Request, Sample, State};
-use virtual_bench::BenchError;
+use virtual_bench::{BenchError, LiveBench};
 
 use super::concealed::Concealed;
 use super::joint::SimJoint;
@@ -156,6 +156,11 @@ impl SimBoard {
     /// Time since it was switched on.
     pub(super) fn now(&self) -> Duration {
         Duration::from_nanos(self.now_ns)
+    }
+
+    /// The bench behind its sensors, for a hand.
+    pub(super) fn bench(&mut self) -> &mut LiveBench {
+        self.joint.bench()
     }
 
     /// Whether there is nothing to send.

@@ -2,6 +2,7 @@
 
 use virtual_bench::{BenchConfig, ConcealedEffect};
 
+use super::wiring::Wiring;
 use crate::error::CommsError;
 
 /// Standard deviation of how far a bench with a seed of its own is off its data sheet: `E A` and `F0` in per cent, others
@@ -13,7 +14,7 @@ const DEFAULT_SEED: u64 = 1;
 
 /// What to do about a name that cannot be used.
 const NEXT: &str =
-    "name it sim, or sim:EFFECT[:STRENGTH][,...][,seed=N] with effects of `virtual-bench effects`";
+    "name it sim, or sim:EFFECT[:STRENGTH][,...][,seed=N][,swap=f1-f3][,dead=f2][,reversed=motor] with effects of `virtual-bench effects`";
 
 /// The simulated joint as it really is.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,12 +25,19 @@ pub struct Concealed {
     pub(super) effects: Vec<ConcealedEffect>,
     /// Seed of the sensors' noise.
     pub(super) seed: u64,
+    /// How the board is wired to it.
+    pub(super) wiring: Wiring,
 }
 
 impl Default for Concealed {
     /// The bench of the data sheet, nothing concealed.
     fn default() -> Self {
-        Self { bench: BenchConfig::default(), effects: Vec::new(), seed: DEFAULT_SEED }
+        Self {
+            bench: BenchConfig::default(),
+            effects: Vec::new(),
+            seed: DEFAULT_SEED,
+            wiring: Wiring::default(),
+        }
     }
 }
 
@@ -45,12 +53,18 @@ impl Concealed {
         let refuse = |reason: String| CommsError::Open { port: port.clone(), reason, next: NEXT.into() };
         let mut seed = None;
         let mut wanted = Vec::new();
+        let mut wiring = Wiring::default();
         for part in list.split(',').map(str::trim) {
             if let Some(text) = part.strip_prefix("seed=") {
                 let number = text
                     .parse()
                     .map_err(|_| refuse(format!("seed: got `{text}`, expected a whole number")))?;
                 seed = Some(number);
+                continue;
+            }
+            if let Some((key, value)) = part.split_once('=')
+                && wiring.take(key, value).map_err(&refuse)?
+            {
                 continue;
             }
             let (id, strength) = part.split_once(':').unwrap_or((part, "1"));
@@ -73,7 +87,7 @@ impl Concealed {
             bench = bench.perturbed(seed, PERCENT_OFF);
         }
         virtual_bench::LiveBench::new(&bench, &effects, drawn).map_err(|error| refuse(error.to_string()))?;
-        Ok(Self { bench, effects, seed: drawn })
+        Ok(Self { bench, effects, seed: drawn, wiring })
     }
 }
 
@@ -99,6 +113,8 @@ mod tests {
             ("joint_backlash:big", "strength of joint_backlash: got `big`"),
             ("seed=x", "seed: got `x`"),
             ("sensor_lag", "sensor_lag"),
+            ("dead=f9", "dead: got `f9`, expected f1, f2, f3 or f4"),
+            ("joint_spring,swaps=f1-f3", "no effect is called 'swaps=f1-f3'"),
             ("joint_spring,joint_spring", "given twice"),
             ("", "no effect is called ''"),
         ] {

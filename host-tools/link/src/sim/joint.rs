@@ -10,6 +10,7 @@ use bowden_control::tick::{EncoderWord, TickInput};
 use virtual_bench::{BenchError, Bridge, Channel, LiveBench};
 
 use super::concealed::Concealed;
+use super::wiring::Wiring;
 
 /// Counts a turn of both encoders.
 const COUNTS_PER_TURN: f64 = 4096.0;
@@ -24,15 +25,21 @@ struct Amplifier {
     volts_per_unit: f64,
 }
 
+/// Volts of a tension input whose wire is broken: the amplifier's output rests at its low rail.
+const BROKEN_V: f64 = 0.02;
+
 const TENSION: Amplifier = Amplifier { zero_v: 0.5, volts_per_unit: 0.023 };
 const CURRENT: Amplifier = Amplifier { zero_v: 1.65, volts_per_unit: 0.12 };
 const BUS: Amplifier = Amplifier { zero_v: 0.0, volts_per_unit: 1.0 / 11.0 };
 
 impl Amplifier {
     fn code(&self, value: f64) -> u16 {
-        let volts = self.zero_v + self.volts_per_unit * value;
-        (volts / REFERENCE_V * FULL_CODE).round().clamp(0.0, FULL_CODE) as u16
+        code_of(self.zero_v + self.volts_per_unit * value)
     }
+}
+
+fn code_of(volts: f64) -> u16 {
+    (volts / REFERENCE_V * FULL_CODE).round().clamp(0.0, FULL_CODE) as u16
 }
 
 /// A joint and the sensors on it.
@@ -40,6 +47,7 @@ pub(super) struct SimJoint {
     bench: LiveBench,
     bridge: Bridge,
     zeros: [f64; 2],
+    wiring: Wiring,
     encoder_sequence: u8,
     frames: [u32; 2],
 }
@@ -52,8 +60,12 @@ impl SimJoint {
     pub(super) fn new(parameters: &Parameters, concealed: &Concealed) -> Result<Self, BenchError> {
         let bench = LiveBench::new(&concealed.bench, &concealed.effects, concealed.seed)?;
         let zero = |name| Parameters::index_of(name).and_then(|index| parameters.get(index)).unwrap_or(0.0);
-        let zeros = [zero("encoder.input.zero").into(), zero("encoder.joint.zero").into()];
-        let mut joint = Self { bench, bridge: Bridge::Open, zeros, encoder_sequence: 0, frames: [0; 2] };
+        let wiring = concealed.wiring.clone();
+        let zeros = match wiring.mounted_counts {
+            Some(counts) => counts.map(f64::from),
+            None => [zero("encoder.input.zero").into(), zero("encoder.joint.zero").into()],
+        };
+        let mut joint = Self { bench, bridge: Bridge::Open, zeros, wiring, encoder_sequence: 0, frames: [0; 2] };
         joint.read_encoders();
         Ok(joint)
     }
@@ -66,8 +78,12 @@ impl SimJoint {
             bus_error: false,
         });
         let tensions = [Channel::F1, Channel::F2, Channel::F3, Channel::F4];
-        let tension_raw = tensions.map(|channel| TENSION.code(self.bench.sensed(channel)));
-        let current_raw = CURRENT.code(self.bench.sensed(Channel::Current));
+        let sensed_n = tensions.map(|channel| self.bench.sensed(channel));
+        let tension_raw =
+            self.wiring.cell.map(|cell| cell.map_or(code_of(BROKEN_V), |cell| TENSION.code(sensed_n[cell])));
+        // The shunt is in the bridge's line to the motor: it sees the leads as the bridge does.
+        let sign = if self.wiring.motor_reversed { -1.0 } else { 1.0 };
+        let current_raw = CURRENT.code(sign * self.bench.sensed(Channel::Current));
         let bus_raw = BUS.code(self.bench.supply_v());
         // The transfer started by this tick is done long before the next one.
         self.read_encoders();
@@ -76,17 +92,33 @@ impl SimJoint {
 
     /// Moves the joint on by `period_s`, a multiple of the PWM's, then sets the bridge as the tick asks.
     pub(super) fn advance(&mut self, duty: f64, bridge_on: bool, period_s: f64) {
+        let at_motor = match self.bridge {
+            Bridge::Duty(duty) if self.wiring.motor_reversed => Bridge::Duty(-duty),
+            other => other,
+        };
         let steps = (period_s / self.bench.config().step_s).round().max(1.0);
         for _ in 0..steps as usize {
-            self.bench.step(self.bridge);
+            self.bench.step(at_motor);
         }
         self.bridge = if bridge_on { Bridge::Duty(duty) } else { Bridge::Open };
     }
 
+    /// The bench, for a hand.
+    pub(super) fn bench(&mut self) -> &mut LiveBench {
+        &mut self.bench
+    }
+
     fn read_encoders(&mut self) {
-        let angles =
+        let mut angles =
             [Channel::ThetaIn, Channel::ThetaOut].map(|channel| self.bench.sensed_angle_rad(channel));
-        for ((frame, angle_rad), zero) in self.frames.iter_mut().zip(angles).zip(self.zeros) {
+        if self.wiring.encoders_swapped {
+            angles.swap(0, 1);
+        }
+        let reversed = self.wiring.encoder_reversed;
+        for (((frame, angle_rad), zero), reversed) in
+            self.frames.iter_mut().zip(angles).zip(self.zeros).zip(reversed)
+        {
+            let angle_rad = if reversed { -angle_rad } else { angle_rad };
             let count = (angle_rad / TAU * COUNTS_PER_TURN + zero).round().rem_euclid(COUNTS_PER_TURN);
             *frame = amt22_frame(count as u16).into();
         }
