@@ -201,3 +201,6 @@ fn sign_off(bench: &mut Bench, sheet: &Sheet, setup: &Setup) -> Result<SignedOff
     })?;
     Ok(SignedOff { at: (setup.now)(), by, stored, parameters: values })
 }
+
+#[cfg(test)]
+mod tests;

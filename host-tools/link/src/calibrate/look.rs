@@ -10,6 +10,9 @@ use crate::session::{RunEnd, Session, Stop};
 /// Length of a look, s: 25 periods of 50 Hz, 30 of 60 Hz.
 pub(super) const LOOK_S: f64 = 0.5;
 
+/// Time of telemetry that is passed over first, s: what was under way before the person said Enter.
+const STALE_S: f64 = 0.05;
+
 /// Length of a block of a watch, s.
 const BLOCK_S: f64 = 0.01;
 
@@ -178,14 +181,20 @@ fn change_of([f1, f2, f3, f4, input, joint]: [f64; 6]) -> Change {
     Change { tension: [f1, f2, f3, f4], encoder: [input, joint] }
 }
 
-/// Gives the time of every tick, s, and its signals to `sink` until it breaks.
+/// Gives the time of every tick, s, and its signals to `sink` until it breaks; the first [`STALE_S`] are left out.
 fn observe(
     session: &mut Session,
     stop: Stop,
     sink: &mut dyn FnMut(f64, &Sample) -> ControlFlow<()>,
 ) -> Result<(), Trouble> {
-    let end = session
-        .observe(stop, &mut |tick| sink(tick.tick as f64 * f64::from(tick.period_ns) * 1e-9, &tick.sample))?;
+    let mut begun = None;
+    let end = session.observe(stop, &mut |tick| {
+        let time_s = tick.tick as f64 * f64::from(tick.period_ns) * 1e-9;
+        if time_s - *begun.get_or_insert(time_s) < STALE_S {
+            return ControlFlow::Continue(());
+        }
+        sink(time_s, &tick.sample)
+    })?;
     match end {
         RunEnd::Interrupted => Err(Trouble::Stopped),
         _ => Ok(()),

@@ -1,9 +1,9 @@
 //! Direction of the motor and resistance of its winding, at low torque, each run after the board's own checks.
 //!
-//! The joint is asked for half and the whole of a quarter of `limits.torque`, in both directions, with `limits.current` lowered to
-//! thrice the current that this takes. `R = dV/di` between the two levels of a direction, with `V = duty·bus − k_t N omega`: the dead time of
-//! the bridge and the zero of the current cancel. A joint that turns the wrong way is stopped after 2.6°; then `bridge.direction` is
-//! changed and the first run repeated.
+//! The joint is asked for half and the whole of a quarter of `limits.torque`, in both directions, with `limits.current` lowered as far as
+//! the board says that this torque can be reached. `R = dV/di` between the two levels of a direction, with `V = duty·bus − k_t N omega`: the dead time of
+//! the bridge and the zero of the current cancel. Friction of the sheaths decides how much current a torque takes, so either level may have
+//! more of it. A joint that turns the wrong way is stopped after 0.9°; then `bridge.direction` is changed and the first run repeated.
 //!
 //! | measured | possible | from |
 //! |---|---|---|
@@ -16,6 +16,7 @@
 
 use std::ops::ControlFlow;
 
+use bowden_control::parameters::Reach;
 use bowden_link::message::{Mode, Reference};
 
 use super::Trouble;
@@ -29,15 +30,24 @@ use crate::session::RunEnd;
 /// Share of `limits.torque` that is asked for.
 const TORQUE_SHARE: f64 = 0.25;
 
-/// Current that is allowed, over the one that the torque takes without friction.
-const CURRENT_SHARE: f64 = 3.0;
+/// Share of what the joint can do that is not exceeded.
+const REACH_SHARE: f64 = 0.9;
+
+/// Steps in which `limits.current` is lowered.
+const CURRENT_STEPS: u8 = 20;
+
+/// Least value of `limits.current`, A.
+const LEAST_CURRENT_A: f32 = 0.05;
 
 /// When the joint has come to rest, and when a run ends, s.
 const SETTLED_S: f64 = 0.7;
 const END_S: f64 = 1.1;
 
-/// Turn of the input pulley by which a direction is told, rad: 30 counts.
-const TOLD_RAD: f64 = 0.046;
+/// Turn of the input pulley that shows that the motor turns it, rad: 30 counts.
+const TURN_RAD: f64 = 0.046;
+
+/// Turn the wrong way at which a run ends, rad: 10 counts, before a tendon is slack.
+const WRONG_RAD: f64 = 0.0153;
 
 /// Turn of the joint that is not exceeded, rad.
 const FARTHEST_RAD: f64 = 0.6;
@@ -62,7 +72,9 @@ struct Held {
 pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), Trouble> {
     bench.set(&sheet.parameters())?;
     bench.tendons(true)?;
-    let torque_nm = TORQUE_SHARE * bench.value("limits.torque")?;
+    let control = bench.session.parameters().control();
+    let reach_nm = f64::from(Reach::of(&control, Mode::Torque).torque);
+    let torque_nm = (TORQUE_SHARE * bench.value("limits.torque")?).min(REACH_SHARE * reach_nm);
     let text = format!(
         "Switch the supply of the bridge on. The joint will turn by some degrees under {} N·m, to both sides: keep clear.",
         short(torque_nm)
@@ -119,51 +131,63 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
 /// `bridge.direction` and R of both directions, Ω, with parameters of the board that are put back by the caller.
 fn measure(bench: &mut Bench, torque_nm: f64, before: [(u16, f32); 2]) -> Result<(i8, [f64; 2]), Trouble> {
     let [(current, current_a), (direction, told)] = before;
-    let radii = bench.value("pulley.input_radius")? / bench.value("pulley.output_radius")?;
-    let needed_a =
-        torque_nm * radii / (bench.value("motor.torque_constant")? * bench.value("motor.gear_ratio")?);
-    let limit_a = current_a.min((CURRENT_SHARE * needed_a).max(0.05) as f32);
+    let control = bench.session.parameters().control();
+    let reaches = |limit_a: f32| {
+        let mut lowered = control.clone();
+        lowered.limits.current = limit_a;
+        f64::from(Reach::of(&lowered, Mode::Torque).torque) >= torque_nm
+    };
+    let steps = (1..CURRENT_STEPS).map(|step| current_a * f32::from(step) / f32::from(CURRENT_STEPS));
+    let limit_a = steps.filter(|limit_a| *limit_a >= LEAST_CURRENT_A).find(|limit_a| reaches(*limit_a)).unwrap_or(current_a);
     bench.session.replace_parameters(&[(current, limit_a)])?;
     let mut sign = told;
-    let mut first = hold(bench, torque_nm)?;
-    if first.turned_rad < -TOLD_RAD {
+    let mut first = hold(bench, torque_nm, true)?;
+    if first.turned_rad < -WRONG_RAD {
         bench.dialog.show("  the joint turned the wrong way: the motor is reversed\n")?;
         sign = -told;
         bench.session.replace_parameters(&[(direction, sign)])?;
-        first = hold(bench, torque_nm)?;
-        if first.turned_rad < -TOLD_RAD {
+        first = hold(bench, torque_nm, true)?;
+        if first.turned_rad < -WRONG_RAD {
             return Err(Trouble::Refused(
                 "the joint turns the wrong way with either direction of the motor; check cables a and b, and the encoders".to_owned(),
             ));
         }
     }
-    if first.turned_rad.abs() < TOLD_RAD {
+    if first.turned_rad < TURN_RAD {
         return Err(Trouble::Refused(format!(
-            "the input pulley turned by {} rad, expected {TOLD_RAD} rad at least; check motor leads and gear",
+            "the input pulley turned by {} rad, expected {TURN_RAD} rad at least; check motor leads and gear",
             short(first.turned_rad)
         )));
     }
-    let half = hold(bench, 0.5 * torque_nm)?;
-    let back = hold(bench, -torque_nm)?;
-    let half_back = hold(bench, -0.5 * torque_nm)?;
-    let slope = |whole: Held, half: Held, sign: f64| {
-        let difference_a = sign * (whole.current_a - half.current_a);
-        let noise_a = whole.unsure_a.hypot(half.unsure_a);
-        if difference_a < SIGMAS * noise_a {
-            return Err(Trouble::Refused(format!(
-                "current changed by {} A between half and whole torque, expected {} A at least; check the shunt amplifier and the leads",
-                short(difference_a),
-                short(SIGMAS * noise_a)
-            )));
-        }
-        Ok((whole.winding_v - half.winding_v) * sign / difference_a)
-    };
-    let ohm = [slope(first, half, 1.0)?, slope(back, half_back, -1.0)?];
-    Ok((if sign < 0.0 { -1 } else { 1 }, ohm))
+    if first.winding_v * first.current_a <= 0.0 {
+        return Err(Trouble::Refused(format!(
+            "{} A at {} V of the winding: exchange the inputs of the shunt amplifier",
+            short(first.current_a),
+            short(first.winding_v)
+        )));
+    }
+    let half = hold(bench, 0.5 * torque_nm, false)?;
+    let back = hold(bench, -torque_nm, false)?;
+    let half_back = hold(bench, -0.5 * torque_nm, false)?;
+    Ok((if sign < 0.0 { -1 } else { 1 }, [slope_ohm(first, half)?, slope_ohm(back, half_back)?]))
 }
 
-/// Holds a torque until the joint has come to rest, or turns the wrong way or too far.
-fn hold(bench: &mut Bench, torque_nm: f64) -> Result<Held, Trouble> {
+/// `dV/di` between two runs, Ω.
+fn slope_ohm(one: Held, other: Held) -> Result<f64, Trouble> {
+    let difference_a = one.current_a - other.current_a;
+    let expected_a = SIGMAS * one.unsure_a.hypot(other.unsure_a);
+    if difference_a.abs() < expected_a {
+        return Err(Trouble::Refused(format!(
+            "current changed by {} A between half and whole torque, expected {} A at least; check the shunt amplifier and the leads",
+            short(difference_a),
+            short(expected_a)
+        )));
+    }
+    Ok((one.winding_v - other.winding_v) / difference_a)
+}
+
+/// Holds a torque until the joint has come to rest, or turns too far, or the wrong way where it `begins` at rest without torque.
+fn hold(bench: &mut Bench, torque_nm: f64, begins: bool) -> Result<Held, Trouble> {
     let stop = bench.stop;
     let conversion = Conversion::new(bench.session.parameters())?;
     let emf_v_s = bench.value("motor.torque_constant")? * bench.value("motor.gear_ratio")?;
@@ -183,7 +207,8 @@ fn hold(bench: &mut Bench, torque_nm: f64) -> Result<Held, Trouble> {
         let (begun_s, at_rad) = *begun.get_or_insert((time_s, angles_rad));
         let passed_s = time_s - begun_s;
         turned_rad = [0, 1].map(|index: usize| angles_rad[index] - at_rad[index]);
-        if turned_rad[0] * torque_nm.signum() < -TOLD_RAD || turned_rad[1].abs() > FARTHEST_RAD || passed_s >= END_S {
+        let wrong_way = begins && turned_rad[0] * torque_nm.signum() < -WRONG_RAD;
+        if wrong_way || turned_rad[1].abs() > FARTHEST_RAD || passed_s >= END_S {
             return ControlFlow::Break(());
         }
         if passed_s >= SETTLED_S && tick.sample.state.drives() {
@@ -198,7 +223,7 @@ fn hold(bench: &mut Bench, torque_nm: f64) -> Result<Held, Trouble> {
         ControlFlow::Continue(())
     })?;
     let turned_rad = [turned_rad[0] * torque_nm.signum(), turned_rad[1]];
-    let wrong_way = turned_rad[0] < -TOLD_RAD;
+    let wrong_way = begins && turned_rad[0] < -WRONG_RAD;
     match end {
         RunEnd::Complete => {}
         RunEnd::Interrupted => return Err(Trouble::Stopped),

@@ -20,12 +20,14 @@ const TURN_RAD: f64 = 0.6;
 /// A hand at the bench of a simulated board.
 pub struct SimHand {
     board: Rc<RefCell<SimBoard>>,
+    /// It took the tendons off, and so keeps the arm from swinging.
+    tendons_off: bool,
 }
 
 impl SimHand {
     /// A hand at the bench of this board.
     pub(super) fn new(board: Rc<RefCell<SimBoard>>) -> Self {
-        Self { board }
+        Self { board, tendons_off: false }
     }
 }
 
@@ -39,16 +41,19 @@ impl Hand for SimHand {
             loads_n
         };
         match act {
-            Act::TakeTendonsOff => bench.set_tendons_fitted(false),
-            Act::FitTendons => bench.set_tendons_fitted(true),
+            Act::TakeTendonsOff | Act::FitTendons => {
+                self.tendons_off = act == Act::TakeTendonsOff;
+                bench.set_tendons_fitted(!self.tendons_off);
+                bench.hold_arm(self.tendons_off.then_some(0.0));
+            }
             Act::HangWeight { cell, mass_kg } => bench.set_cell_load_n(load(cell, mass_kg * GRAVITY_M_PER_S2)),
             Act::Pull { cell } => bench.set_cell_load_n(load(cell, PULL_N)),
-            Act::TurnInput => bench.hold_input(Some(TURN_RAD)),
-            Act::TurnJoint => bench.hold_arm(Some(TURN_RAD)),
+            Act::TurnInput => bench.hold_input(Some(bench.theta_in_rad() + TURN_RAD)),
+            Act::TurnJoint => bench.hold_arm(Some(bench.theta_out_rad() + TURN_RAD)),
             Act::LetGo => {
                 bench.set_cell_load_n([0.0; 4]);
                 bench.hold_input(None);
-                bench.hold_arm(None);
+                bench.hold_arm(self.tendons_off.then_some(0.0));
             }
         }
     }
