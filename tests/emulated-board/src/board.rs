@@ -437,6 +437,12 @@ impl Board {
         Ok(self.bus_mut().rig.set_wrap_angle_rad(now_s, wrap_angle_rad)?)
     }
 
+    /// The bench, for somebody's hands: tendons, shafts and load cells. The board steps it.
+    pub fn by_hand(&mut self) -> &mut LiveBench {
+        let now_s = self.time_s();
+        self.bus_mut().rig.by_hand(now_s)
+    }
+
     /// Lets something go wrong until [`Self::clear`].
     pub fn inject(&mut self, injection: Injection) {
         self.injected.push(injection);

@@ -113,6 +113,12 @@ impl Rig {
         &self.bench
     }
 
+    /// The bench, stepped up to board time `time_s`, for somebody's hands.
+    pub(crate) fn by_hand(&mut self, time_s: f64) -> &mut LiveBench {
+        self.advance(time_s);
+        &mut self.bench
+    }
+
     /// What the bridge does.
     pub(crate) fn bridge(&self) -> Bridge {
         self.bridge

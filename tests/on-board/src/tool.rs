@@ -1,8 +1,10 @@
 //! The host tool `bowden`, run against the pseudo terminal of an emulated board.
 
 use std::env;
+use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use bowden_board::{Board, Terminal};
@@ -114,6 +116,74 @@ impl Plugged {
         Ok(Ran { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) })
     }
 
+    /// Runs `bowden <command> --port <terminal> --timeout 600 <arguments>` and answers its questions: `answer` gets each question, and the
+    /// board, to whose bench it may do what the question asks for. Without an answer the tool's standard input ends.
+    pub fn converse(
+        &mut self,
+        command: &str,
+        arguments: &[&str],
+        mut answer: impl FnMut(&str, &mut Board) -> Option<String>,
+    ) -> Outcome<Ran> {
+        let before = self.arguments(command);
+        let line: Vec<&str> = before.iter().map(String::as_str).chain(arguments.iter().copied()).collect();
+        let path = tool()?;
+        let what = format!("{} {}", path.display(), line.join(" "));
+        let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
+        let mut child = Command::new(&path)
+            .args(&line)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(failed)?;
+        let mut input = child.stdin.take();
+        let Some(mut printed) = child.stdout.take() else { return fail("no standard output") };
+        // Another thread reads what it prints, so that neither side waits for the other one.
+        let (sender, bytes) = mpsc::channel();
+        let reading = std::thread::spawn(move || {
+            let mut byte = [0];
+            while let Ok(1) = printed.read(&mut byte) {
+                if sender.send(byte[0]).is_err() {
+                    break;
+                }
+            }
+        });
+        let waiting = std::thread::spawn(move || child.wait_with_output());
+        let mut output = Vec::new();
+        let mut written = Ok(());
+        // The board may not run while a question stands: what is done at its bench is done at once.
+        while !waiting.is_finished() {
+            let end = || waiting.is_finished();
+            let mut asked = false;
+            self.attend_beside(
+                &what,
+                || {
+                    output.extend(bytes.try_iter());
+                    asked = question(&output).is_some();
+                    asked || end()
+                },
+                |_| (),
+            )?;
+            let Some(text) = question(&output).filter(|_| asked) else { continue };
+            output.push(b'\n');
+            match (answer(&text, &mut self.board), &mut input) {
+                (Some(line), Some(stdin)) => written = writeln!(stdin, "{line}"),
+                _ => input = None,
+            }
+        }
+        drop(input);
+        let ended = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
+        let ended = ended.map_err(failed)?;
+        reading.join().map_err(|_| Failure(format!("{what}: the reading thread failed")))?;
+        output.extend(bytes.try_iter());
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let ran = Ran { status: ended.status.code(), output: text(&output), errors: text(&ended.stderr) };
+        if written.is_err() && ran.status == Some(0) {
+            return fail(format!("{what}: took no answer"));
+        }
+        Ok(ran)
+    }
+
     /// Lets the board run with its port on the terminal until `is_done`.
     ///
     /// Neither side depends on how fast this machine is: the board stands still while the terminal has no room for its bytes, and
@@ -153,4 +223,11 @@ impl Plugged {
         }
         Ok(())
     }
+}
+
+/// The question at the end of what a tool has printed: a last line that is not ended, and ends as questions do.
+fn question(output: &[u8]) -> Option<String> {
+    let last = output.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
+    let text = String::from_utf8(last.to_vec()).ok()?;
+    ["] ", "? ", "): "].iter().any(|end| text.ends_with(end)).then_some(text)
 }

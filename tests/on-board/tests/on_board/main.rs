@@ -3,6 +3,7 @@
 mod boot;
 mod boot_loader;
 mod bridge;
+mod calibrate;
 mod clock;
 mod closed_loop;
 mod conformance;
