@@ -50,7 +50,9 @@ pub fn read_line() -> Result<Option<String>, Failure> {
             Ok(Ok(line)) => return Ok(line),
             Ok(Err(error)) => {
                 let reason = output::describe(&error);
-                return Err(Failure::failed(format!("standard input: cannot be read: {reason}; use another terminal")));
+                return Err(Failure::failed(format!(
+                    "standard input: cannot be read: {reason}; use another terminal"
+                )));
             }
             Err(mpsc::RecvTimeoutError::Timeout) => {}
             Err(mpsc::RecvTimeoutError::Disconnected) => return Ok(None),

@@ -86,7 +86,7 @@ fn every_line_of_the_first_hour_runs() {
             ran += 1;
         }
     }
-    assert_eq!(ran, 16);
+    assert_eq!(ran, 17);
     for file in ["bench.toml", "first.mcap", "rig.toml", "found/report.html", "whole.mcap", "first.parquet"] {
         assert!(place.join(file).exists(), "{file}");
     }

@@ -121,7 +121,7 @@ pub fn calibrate(
         tool: setup.tool.clone(),
     };
     let mut sheet = Sheet::open(setup.out, board)?;
-    let mut bench = Bench { session, hand, dialog, stop: setup.stop, tendons_on: None };
+    let mut bench = Bench { session, hand, dialog, stop: setup.stop, file: setup.out, tendons_on: None };
     for (index, step) in STEPS.iter().enumerate() {
         let head = format!("{} of {}: {}", index + 1, STEPS.len(), step.title);
         if (step.done)(&sheet) {
@@ -132,7 +132,8 @@ pub fn calibrate(
         carry_out(&mut bench, &mut sheet, step, setup)?;
         sheet.save(setup.out)?;
     }
-    let signed = sign_off(&mut bench, &sheet, setup).map_err(|trouble| ended(trouble, "the sign-off", setup))?;
+    let signed =
+        sign_off(&mut bench, &sheet, setup).map_err(|trouble| ended(trouble, "the sign-off", setup))?;
     sheet.signed_off = Some(signed);
     sheet.save(setup.out)?;
     bench.dialog.show(&format!("{}: signed off\n", setup.out.display()))?;
@@ -191,8 +192,8 @@ fn ended(trouble: Trouble, during: &str, setup: &Setup) -> Failure {
 fn sign_off(bench: &mut Bench, sheet: &Sheet, setup: &Setup) -> Result<SignedOff, Trouble> {
     let values = sheet.parameters();
     bench.set(&values)?;
-    let stored =
-        setup.store || yes(bench.dialog, "Store the parameters in the board's flash, for the time after a power cut?")?;
+    let stored = setup.store
+        || yes(bench.dialog, "Store the parameters in the board's flash, for the time after a power cut?")?;
     if stored {
         bench.session.client().store_parameters()?;
     }

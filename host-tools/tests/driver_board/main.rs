@@ -4,6 +4,7 @@
 //! No result depends on wall-clock time: see [`wires`] and [`pseudo_terminal`].
 
 mod bench_run;
+mod calibrate;
 mod client;
 #[path = "../common/mod.rs"]
 mod common;

@@ -363,7 +363,11 @@ impl Plant {
         let inertia = self.rotor_inertia_kg_m2();
         self.rotor.advance(rotor_nm, inertia, dt);
         let hand_nm = hand::torque_nm(self.hands.input_rad, self.input);
-        self.input.advance(gear_nm - drum_nm - viscous_nm + hand_nm, self.config.input_shaft_inertia_kg_m2, dt);
+        self.input.advance(
+            gear_nm - drum_nm - viscous_nm + hand_nm,
+            self.config.input_shaft_inertia_kg_m2,
+            dt,
+        );
         gear_nm
     }
 

@@ -1,6 +1,8 @@
 //! Board, person and questions of a calibration.
 
 use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
 
 use bowden_core::outcome::Failure;
 use bowden_link::message::Goal;
@@ -32,6 +34,8 @@ pub(super) struct Bench<'b> {
     pub dialog: &'b mut dyn Dialog,
     /// Whether the user wants to stop.
     pub stop: Stop<'b>,
+    /// File of the calibration.
+    pub file: &'b Path,
     /// Whether the tendons are on their pulleys, once somebody has said so.
     pub tendons_on: Option<bool>,
 }
@@ -68,7 +72,10 @@ impl Bench<'_> {
             );
             (text, Act::FitTendons)
         } else {
-            ("Take both tendons off their pulleys; nothing may pull at a load cell.".to_owned(), Act::TakeTendonsOff)
+            (
+                "Take both tendons off their pulleys; nothing may pull at a load cell.".to_owned(),
+                Act::TakeTendonsOff,
+            )
         };
         self.have(&text, act)?;
         self.tendons_on = Some(on);
@@ -104,7 +111,8 @@ impl Bench<'_> {
             let parameter = self.session.parameters().find(name)?;
             let new = *value as f32;
             if parameter.value.to_bits() != new.to_bits() {
-                table += &format!("  {name:<24} {:>12} -> {new} {}\n", parameter.value, parameter.unit);
+                let line = format!("  {name:<24} {:>12} -> {new} {}", parameter.value, parameter.unit);
+                let _ = writeln!(table, "{}", line.trim_end());
                 changes.push((parameter.index, new));
             }
         }

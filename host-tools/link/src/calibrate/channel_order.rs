@@ -2,6 +2,7 @@
 //!
 //! | measured | possible | from |
 //! |---|---|---|
+//! | input before the pull | within 1 % of the converter's range of its zero | the tendons were off then, and are now |
 //! | change of the input that answers | at least 2 % of the converter's range, upwards | far above noise, 3 N with the default gain |
 //! | change of any other input | less than a quarter of that | the tendons are off, so cells share nothing |
 //!
@@ -15,6 +16,7 @@ use super::bench::{Bench, CHANNELS, PLACES, short};
 use super::hand::Act;
 use super::look::{Change, PATIENCE_S};
 use super::sheet::{ChannelOrder, Sheet};
+use super::zeros::still_there;
 
 /// Change that counts, codes: 2 % of the converter's range.
 pub(super) const CHANGE_CODES: f64 = 82.0;
@@ -30,6 +32,7 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
     for cell in &fitted {
         let (name, place) = (CHANNELS[*cell], PLACES[*cell]);
         let before = bench.look()?;
+        still_there(bench, sheet, &before)?;
         let text = format!(
             "Within {PATIENCE_S} s after Enter: pull at load cell {name} ({place}) by hand and hold until the next question."
         );
@@ -78,7 +81,10 @@ fn judge(cell: usize, change: Option<Change>, fitted: &[usize]) -> Result<f64, S
         return Err(format!("load cell {name} is plugged into input {}", CHANNELS[answers]));
     }
     if codes < 0.0 {
-        return Err(format!("input {name} fell by {:.1} codes under a pull: its signal wires are reversed", -codes));
+        return Err(format!(
+            "input {name} fell by {:.1} codes under a pull: its signal wires are reversed",
+            -codes
+        ));
     }
     match other {
         Some(other) => Err(format!(

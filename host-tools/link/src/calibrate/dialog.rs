@@ -45,9 +45,13 @@ pub(super) fn ask<T>(
 
 /// Waits until the person has done what the text says.
 pub(super) fn done(dialog: &mut dyn Dialog, what: &str) -> Result<(), Trouble> {
-    ask(dialog, &format!("{what} [Enter] "), |answer| {
-        if answer.is_empty() { Ok(()) } else { Err("Enter".to_owned()) }
-    })
+    ask(
+        dialog,
+        &format!("{what} [Enter] "),
+        |answer| {
+            if answer.is_empty() { Ok(()) } else { Err("Enter".to_owned()) }
+        },
+    )
 }
 
 /// Asks for yes or no.

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | turn of the shaft that is turned | at least 10°, held | far above a hand's tremor |
 //! | turn of the other encoder | less than a quarter of that | the tendons are off |
+//! | tensions before | within 1 % of the converter's range of their zeros | the tendons were off then, and are now |
 //! | change of the tensions | less than 2 % of the converter's range | the same |
 //! | range of a count at angle zero | up to 2 counts | as the board's self test demands |
 
@@ -13,7 +14,7 @@ use super::channel_order::CHANGE_CODES;
 use super::hand::Act;
 use super::look::{Look, PATIENCE_S};
 use super::sheet::{Encoder, Encoders, Sheet};
-use super::zeros::level;
+use super::zeros::{level, still_there};
 
 /// Counts a turn.
 const COUNTS_PER_TURN: f64 = 4096.0;
@@ -32,11 +33,12 @@ const ENCODERS: [(&str, &str); 2] = [("input", "input pulley"), ("joint", "joint
 
 pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), Trouble> {
     bench.tendons(false)?;
-    let input_counts = turned(bench, 0)?;
-    let joint_counts = turned(bench, 1)?;
+    let input_counts = turned(bench, sheet, 0)?;
+    let joint_counts = turned(bench, sheet, 1)?;
     bench.tendons(true)?;
     let look = bench.look()?;
-    let [input, joint] = [(0, input_counts), (1, joint_counts)].map(|(index, counts)| at_zero(&look, index, counts));
+    let [input, joint] =
+        [(0, input_counts), (1, joint_counts)].map(|(index, counts)| at_zero(&look, index, counts));
     let (input, joint) = (input?, joint?);
     let line = |(name, encoder): (&str, &Encoder)| {
         format!("  {name}: direction {:+}, zero {}\n", encoder.direction, encoder.zero_count)
@@ -47,9 +49,10 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
 }
 
 /// Counts by which an encoder moves when its shaft alone is turned towards +θ.
-fn turned(bench: &mut Bench, index: usize) -> Result<f64, Trouble> {
+fn turned(bench: &mut Bench, sheet: &Sheet, index: usize) -> Result<f64, Trouble> {
     let ((name, shaft), (other_name, _)) = (ENCODERS[index], ENCODERS[1 - index]);
     let before = bench.look()?;
+    still_there(bench, sheet, &before)?;
     let text = format!(
         "Within {PATIENCE_S} s after Enter: turn the {shaft} alone by hand towards +theta (the way cable a pulls it), by 10 to 90 \
          degrees, and hold until the next question."

@@ -6,6 +6,7 @@
 //! | change of any other channel | less than a quarter of that | the tendons are off |
 //! | gain | `tension.over` within `tension.rail_high` | the board has to see an overload |
 //! | gain | spread at rest up to `supervisor.tension_noise` | the board's self test refuses more |
+//! | gain | within a factor of 1.25 of the board's present one, or the person confirms it | a wrong mass |
 //! | spread of the gain | up to 1 % of it | noise of both levels |
 //! | spread and drift under the weight | as of a zero | a weight that swings |
 
@@ -14,7 +15,7 @@ use std::collections::BTreeMap;
 use super::Trouble;
 use super::bench::{Bench, CHANNELS, PLACES, short};
 use super::channel_order::CHANGE_CODES;
-use super::dialog::{ask, number};
+use super::dialog::{ask, number, yes};
 use super::hand::Act;
 use super::look::{Channel, Look};
 use super::sheet::{Gain, Gains, Level, Sheet};
@@ -28,6 +29,9 @@ const MASS_KG: [f64; 2] = [0.05, 100.0];
 
 /// Share of the change that another channel may show.
 const SHARE: f64 = 0.25;
+
+/// Factor from the board's present gain beyond which the person is asked.
+const FAR: f64 = 1.25;
 
 /// Spread of a gain over the gain.
 const UNSURE: f64 = 0.01;
@@ -45,11 +49,12 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
     let mut refused: BTreeMap<&str, String> = BTreeMap::new();
     loop {
         let question = format!("Which load cell carries a known weight next? [{choice}] ");
-        let cell = ask(bench.dialog, &question, |answer| match CHANNELS.iter().position(|name| *name == answer) {
-            Some(cell) if fitted.contains(&cell) => Ok(Some(cell)),
-            _ if answer == "done" => Ok(None),
-            _ => Err(choice.clone()),
-        })?;
+        let cell =
+            ask(bench.dialog, &question, |answer| match CHANNELS.iter().position(|name| *name == answer) {
+                Some(cell) if fitted.contains(&cell) => Ok(Some(cell)),
+                _ if answer == "done" => Ok(None),
+                _ => Err(choice.clone()),
+            })?;
         let Some(cell) = cell else { break };
         let (name, place) = (CHANNELS[cell], PLACES[cell]);
         let mass_kg = number(bench.dialog, &format!("Mass of the weight for {name}, kg?"), MASS_KG, "kg")?;
@@ -60,7 +65,8 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
         let look = look?;
         refused.remove(name);
         gains.remove(name);
-        match judge(bench, &zeros.tension, cell, mass_kg, &look) {
+        match judge(bench, &zeros.tension, cell, mass_kg, &look).and_then(|gain| confirmed(bench, name, gain))
+        {
             Ok(gain) => {
                 let (mean, spread) = (gain.gain_n_per_code, gain.spread_n_per_code);
                 bench.dialog.show(&format!("  {name}: {mean:.6} N/code, spread {spread:.6}\n"))?;
@@ -80,6 +86,22 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
     Ok(())
 }
 
+/// The gain, where it is near the board's present one or the person says that it is right.
+fn confirmed(bench: &mut Bench, name: &str, gain: Gain) -> Result<Gain, Trouble> {
+    let present_n = bench.value(&format!("tension.{name}.gain"))?;
+    let new_n = gain.gain_n_per_code;
+    if (1.0 / FAR..=FAR).contains(&(new_n / present_n)) {
+        return Ok(gain);
+    }
+    let question = format!(
+        "{name}: {new_n:.6} N/code, tension.{name}.gain {present_n:.6} N/code: are mass and amplifier as you say?"
+    );
+    if yes(bench.dialog, &question)? {
+        return Ok(gain);
+    }
+    Err(Trouble::Refused(format!("{name}: {new_n:.6} N/code; weigh it again with the right mass")))
+}
+
 /// Gain of a channel under a weight, or why it cannot be.
 fn judge(
     bench: &Bench,
@@ -90,9 +112,8 @@ fn judge(
 ) -> Result<Gain, Trouble> {
     let name = CHANNELS[cell];
     let refuse = |reason: String| Err(Trouble::Refused(format!("{name}: {reason}")));
-    let change = |other: usize| {
-        zeros.get(CHANNELS[other]).map_or(0.0, |zero| look.tension[other].mean() - zero.mean)
-    };
+    let change =
+        |other: usize| zeros.get(CHANNELS[other]).map_or(0.0, |zero| look.tension[other].mean() - zero.mean);
     let codes = change(cell);
     let size = |other: &usize| change(*other).abs();
     let other = (0..4).filter(|other| *other != cell).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
@@ -135,9 +156,13 @@ fn judge(
     }
     check_rest(bench, cell, channel, gain_n)?;
     let variance = |spread: f64, samples: u64| spread * spread / (samples.max(1) as f64);
-    let off = (variance(zero.spread, zero.samples) + variance(channel.spread(), channel.samples())).sqrt() / codes;
+    let off =
+        (variance(zero.spread, zero.samples) + variance(channel.spread(), channel.samples())).sqrt() / codes;
     if off > UNSURE {
-        return refuse(format!("gain is {:.1} % unsure, expected 1 % at most; take a heavier weight", off * 100.0));
+        return refuse(format!(
+            "gain is {:.1} % unsure, expected 1 % at most; take a heavier weight",
+            off * 100.0
+        ));
     }
     let round = |value: f64| (value * 1e9).round() / 1e9;
     Ok(Gain {

@@ -90,7 +90,8 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
         )));
     }
     let names = ["limits.current", "bridge.direction"];
-    let before = names.map(|name| bench.session.parameters().find(name).map(|found| (found.index, found.value)));
+    let before =
+        names.map(|name| bench.session.parameters().find(name).map(|found| (found.index, found.value)));
     let [current, direction] = before;
     let before = [current?, direction?];
     let measured = measure(bench, torque_nm, before);
@@ -108,14 +109,21 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
         )));
     }
     let believed_ohm = bench.value("motor.resistance")?;
-    bench.dialog.show(&format!("  direction {direction:+}, R {} ohm, spread {}\n", short(resistance_ohm), short(apart_ohm / 2.0)))?;
+    bench.dialog.show(&format!(
+        "  direction {direction:+}, R {} ohm, spread {}\n",
+        short(resistance_ohm),
+        short(apart_ohm / 2.0)
+    ))?;
     if !(0.5..=2.0).contains(&(resistance_ohm / believed_ohm)) {
         let question = format!(
             "R is {} ohm with its leads, motor.resistance {believed_ohm} ohm: is that the motor?",
             short(resistance_ohm)
         );
         if !yes(bench.dialog, &question)? {
-            return Err(Trouble::Refused(format!("R of {} ohm; check motor and leads", short(resistance_ohm))));
+            return Err(Trouble::Refused(format!(
+                "R of {} ohm; check motor and leads",
+                short(resistance_ohm)
+            )));
         }
     }
     sheet.motor = Some(Motor {
@@ -138,7 +146,10 @@ fn measure(bench: &mut Bench, torque_nm: f64, before: [(u16, f32); 2]) -> Result
         f64::from(Reach::of(&lowered, Mode::Torque).torque) >= torque_nm
     };
     let steps = (1..CURRENT_STEPS).map(|step| current_a * f32::from(step) / f32::from(CURRENT_STEPS));
-    let limit_a = steps.filter(|limit_a| *limit_a >= LEAST_CURRENT_A).find(|limit_a| reaches(*limit_a)).unwrap_or(current_a);
+    let limit_a = steps
+        .filter(|limit_a| *limit_a >= LEAST_CURRENT_A)
+        .find(|limit_a| reaches(*limit_a))
+        .unwrap_or(current_a);
     bench.session.replace_parameters(&[(current, limit_a)])?;
     let mut sign = told;
     let mut first = hold(bench, torque_nm, true)?;
@@ -234,7 +245,10 @@ fn hold(bench: &mut Bench, torque_nm: f64, begins: bool) -> Result<Held, Trouble
             }
         }
         RunEnd::Left(state) => {
-            return Err(Trouble::Refused(format!("the board went to state {state} under {} N·m", short(torque_nm))));
+            return Err(Trouble::Refused(format!(
+                "the board went to state {state} under {} N·m",
+                short(torque_nm)
+            )));
         }
     }
     if turned_rad[1].abs() > FARTHEST_RAD && !wrong_way {
@@ -246,7 +260,8 @@ fn hold(bench: &mut Bench, torque_nm: f64, begins: bool) -> Result<Held, Trouble
     }
     let count = count.max(1.0);
     let [voltage_v, current_a, square] = sums.map(|sum| sum / count);
-    let speed_rad_s = settled.map_or(0.0, |(time_s, angle_rad)| (last.1 - angle_rad) / (last.0 - time_s).max(1e-3));
+    let speed_rad_s =
+        settled.map_or(0.0, |(time_s, angle_rad)| (last.1 - angle_rad) / (last.0 - time_s).max(1e-3));
     Ok(Held {
         turned_rad: turned_rad[0],
         winding_v: voltage_v - emf_v_s * speed_rad_s,

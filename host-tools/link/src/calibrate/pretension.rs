@@ -90,5 +90,8 @@ fn is_new(bench: &mut Bench, mean_n: f64) -> Result<bool, Trouble> {
         return Ok(true);
     }
     let (verb, less) = if mean_n < wanted_n { ("tighten", "below") } else { ("loosen", "above") };
-    Err(Trouble::Refused(format!("{} N {less} tendon.pretension; {verb} the tendons", short((mean_n - wanted_n).abs()))))
+    Err(Trouble::Refused(format!(
+        "{} N {less} tendon.pretension; {verb} the tendons",
+        short((mean_n - wanted_n).abs())
+    )))
 }

@@ -226,10 +226,12 @@ impl Sheet {
     /// Exit status 2, with the place in the file: it is no calibration.
     pub fn load(path: &Path) -> Result<Self, Failure> {
         let refuse = |what: String| Failure::bad_input(format!("{}: {what}", path.display()));
-        let text = fs::read_to_string(path)
-            .map_err(|error| refuse(format!("cannot be read: {}; check the path", output::describe(&error))))?;
+        let text = fs::read_to_string(path).map_err(|error| {
+            refuse(format!("cannot be read: {}; check the path", output::describe(&error)))
+        })?;
         let sheet: Self = toml::from_str(&text).map_err(|error| {
-            let line = error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+            let line =
+                error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
             Failure::bad_input(format!(
                 "{}:{line}: no calibration: {}; name another file",
                 path.display(),

@@ -64,8 +64,11 @@ impl Dialog for Script {
 /// A hand that does something else in the place of an act.
 struct Clumsy<H> {
     hand: H,
-    instead: fn(Act) -> Option<Act>,
+    instead: Instead,
 }
+
+/// What a hand does in the place of an act.
+type Instead = Box<dyn FnMut(Act) -> Option<Act>>;
 
 impl<H: Hand> Hand for Clumsy<H> {
     fn act(&mut self, act: Act) {
@@ -88,14 +91,20 @@ impl Case {
         Self::clumsy(port, Some)
     }
 
-    fn clumsy(port: &str, instead: fn(Act) -> Option<Act>) -> Self {
+    fn clumsy(port: &str, instead: impl FnMut(Act) -> Option<Act> + 'static) -> Self {
         let list = port.strip_prefix("sim:");
         let board = list.map_or_else(SimTransport::new, |list| {
             SimTransport::with(&Concealed::parse(list).unwrap()).unwrap()
         });
-        let hand = Box::new(Clumsy { hand: board.hand(), instead });
+        let hand = Box::new(Clumsy { hand: board.hand(), instead: Box::new(instead) });
         let client = Client::connect(Box::new(board), "sim", Duration::from_secs(2)).unwrap();
         Self { session: Session::new(client).unwrap(), hand, folder: tempfile::tempdir().unwrap() }
+    }
+
+    /// Sets a parameter of the board, as it was before somebody calibrates it.
+    fn told(&mut self, name: &str, value: f32) {
+        let index = self.session.parameters().find(name).unwrap().index;
+        self.session.replace_parameters(&[(index, value)]).unwrap();
     }
 
     fn file(&self) -> std::path::PathBuf {
@@ -130,7 +139,7 @@ impl Case {
 }
 
 /// A right script for a board that is wired wrongly or a hand that is clumsy.
-fn refused(port: &str, instead: fn(Act) -> Option<Act>) -> String {
+fn refused(port: &str, instead: impl FnMut(Act) -> Option<Act> + 'static) -> String {
     Case::clumsy(port, instead).refused(&mut Script::new())
 }
 
@@ -156,7 +165,10 @@ fn a_board_is_calibrated_to_what_the_bench_is_and_signed_off() {
     assert!((motor.resistance_ohm - 2.0).abs() < 0.1, "{motor:?}");
     assert_eq!(value("motor.resistance"), motor.resistance_ohm);
     let signed = sheet.signed_off.clone().unwrap();
-    assert_eq!((signed.by.as_str(), signed.at.as_str(), signed.stored), ("Ada Lovelace", "2030-01-02T03:04:05Z", true));
+    assert_eq!(
+        (signed.by.as_str(), signed.at.as_str(), signed.stored),
+        ("Ada Lovelace", "2030-01-02T03:04:05Z", true)
+    );
     assert_eq!(signed.parameters, sheet.parameters());
     // What was lowered for the motor is as before.
     assert_eq!(value("limits.current"), 3.0);
@@ -182,7 +194,10 @@ fn reversed_encoders_and_motor_are_found_and_set() {
 #[test]
 fn wrong_wires_are_found_and_named() {
     for (port, expected) in [
-        ("sim:swap=f1-f3", "load cell f1 is plugged into input f3, load cell f3 is plugged into input f1; correct the wires"),
+        (
+            "sim:swap=f1-f3",
+            "load cell f1 is plugged into input f3, load cell f3 is plugged into input f1; correct the wires",
+        ),
         ("sim:swap=f1-f2,swap=f3-f4", "load cell f4 is plugged into input f3; correct"),
         ("sim:dead=f2", "f2: 0.02 V, expected 0.1 to 3.2 V; look for a broken wire"),
         ("sim:swap=encoders", "the input pulley was turned, but the joint encoder moved, by +"),
@@ -213,14 +228,20 @@ fn what_a_hand_forgets_is_refused_with_the_reason() {
         act => Some(act),
     };
     let reason = refused("sim", forgets);
-    assert!(reason.contains("f3: ") && reason.contains("codes under 2 kg, expected 82 at least; hang the weight"), "{reason}");
+    assert!(
+        reason.contains("f3: ") && reason.contains("codes under 2 kg, expected 82 at least; hang the weight"),
+        "{reason}"
+    );
 
     let other_cell = |act| match act {
         Act::HangWeight { cell: 1, mass_kg } => Some(Act::HangWeight { cell: 3, mass_kg }),
         act => Some(act),
     };
     let reason = refused("sim", other_cell);
-    assert!(reason.contains("f2: the weight shows at input f4; check the channel order, or hang it on f2"), "{reason}");
+    assert!(
+        reason.contains("f2: the weight shows at input f4; check the channel order, or hang it on f2"),
+        "{reason}"
+    );
 
     // 30 N of pretension are code 1477: 2494 codes below the rail at 3.2 V, 87.4 N of the 90 N that have to fit.
     let tendons_on = |act| match act {
@@ -243,7 +264,10 @@ fn what_a_hand_forgets_is_refused_with_the_reason() {
         act => Some(act),
     };
     let reason = refused("sim", turns_nothing);
-    assert!(reason.contains("encoder joint: neither encoder turned by 114 counts; turn the joint"), "{reason}");
+    assert!(
+        reason.contains("encoder joint: neither encoder turned by 114 counts; turn the joint"),
+        "{reason}"
+    );
 
     let tendons_off = |act| match act {
         Act::FitTendons => None,
@@ -252,6 +276,43 @@ fn what_a_hand_forgets_is_refused_with_the_reason() {
     let reason = refused("sim", tendons_off);
     // The arm is still being lowered.
     assert!(reason.contains("encoder joint: moved over"), "{reason}");
+}
+
+#[test]
+fn zeros_that_were_measured_with_the_tendons_on_are_found_when_they_are_off() {
+    // Where 80 N are enough the level alone does not tell. The tendons come off with the second time of asking.
+    let mut asked = 0;
+    let later = move |act| {
+        asked += usize::from(act == Act::TakeTendonsOff);
+        if act == Act::TakeTendonsOff && asked == 1 { None } else { Some(act) }
+    };
+    let mut case = Case::clumsy("sim", later);
+    case.told("tension.over", 80.0);
+    let mut script = Script::new().with("Measure this step again?", &["", "stop"]);
+    let reason = case.refused(&mut script);
+    assert!(script.transcript.contains("joint encoder moved as well, by"), "{}", script.transcript);
+    // 30 N of 23 mV/N are 856 codes.
+    assert!(
+        reason.contains("f1: -85") && reason.contains("codes from its zero; take the tendons off"),
+        "{reason}"
+    );
+    assert!(reason.contains("calibration.toml and begin again: they were on"), "{reason}");
+}
+
+#[test]
+fn a_mass_that_is_off_by_more_than_a_quarter_is_asked_about() {
+    let two_kg = |act| match act {
+        Act::HangWeight { cell, .. } => Some(Act::HangWeight { cell, mass_kg: 2.0 }),
+        act => Some(act),
+    };
+    let script = || Script::new().with("Mass of the weight", &["3"]).with("Which load cell", &["f4", "done"]);
+    let reason = Case::clumsy("sim", two_kg).refused(&mut script().with("f4: 0.0525", &["no"]));
+    assert!(reason.contains("f4: 0.0525") && reason.contains("weigh it again"), "{reason}");
+    let mut case = Case::clumsy("sim", two_kg);
+    let mut script = script().with("f4: 0.0525", &["yes"]).with("Fit both tendons", &["stop"]);
+    case.run(&mut script).unwrap_err();
+    let gain = Sheet::load(&case.file()).unwrap().gains.unwrap().tension["f4"];
+    assert!((gain.gain_n_per_code / (1.5 * 3.3 / 4095.0 / 0.023) - 1.0).abs() < 1.5e-3, "{gain:?}");
 }
 
 #[test]
@@ -267,7 +328,8 @@ fn impossible_masses_are_refused_by_the_gain_that_they_make() {
             act => Some(act),
         };
         let script = Script::new().with("Mass of the weight", &[mass]);
-        let reason = Case::clumsy("sim", two_kg).refused(&mut script.with("Which load cell", &["f4", "done"]));
+        let reason =
+            Case::clumsy("sim", two_kg).refused(&mut script.with("Which load cell", &["f4", "done"]));
         assert!(reason.contains("f4: ") && reason.contains("; check the mass"), "{reason}");
         assert!(reason.contains(expected), "{mass}: {reason}");
     }
@@ -298,7 +360,12 @@ fn a_stopped_calibration_goes_on_behind_what_is_done() {
     let mut case = Case::new("sim");
     let mut script = Script::new().with("Which load cell", &["f1", "stop"]);
     let failure = case.run(&mut script).unwrap_err();
-    assert!(failure.message().starts_with("stopped by the user during gains, with a weight; the same command goes on"), "{failure}");
+    assert!(
+        failure
+            .message()
+            .starts_with("stopped by the user during gains, with a weight; the same command goes on"),
+        "{failure}"
+    );
     let before = Sheet::load(&case.file()).unwrap();
     assert!(before.channel_order.is_some() && before.gains.is_none() && before.signed_off.is_none());
     // No more answers: what is done stays as well.
@@ -306,7 +373,11 @@ fn a_stopped_calibration_goes_on_behind_what_is_done() {
     let failure = case.run(&mut script).unwrap_err();
     assert_eq!(failure.class(), FailureClass::BadInput);
     assert!(failure.message().starts_with("standard input: no answer to `Fit both tendons"), "{failure}");
-    assert!(script.transcript.starts_with("1 of 6: zeros of the tension channels and of the current: done before\n"));
+    assert!(
+        script
+            .transcript
+            .starts_with("1 of 6: zeros of the tension channels and of the current: done before\n")
+    );
     let mut script = Script::new();
     case.run(&mut script).unwrap();
     let after = Sheet::load(&case.file()).unwrap();
@@ -316,7 +387,10 @@ fn a_stopped_calibration_goes_on_behind_what_is_done() {
     let text = fs::read_to_string(case.file()).unwrap();
     let failure = case.run(&mut Script::new()).unwrap_err();
     assert_eq!(failure.class(), FailureClass::BadInput);
-    assert!(failure.message().contains("signed off by Ada Lovelace at 2030-01-02T03:04:05Z; name another file"), "{failure}");
+    assert!(
+        failure.message().contains("signed off by Ada Lovelace at 2030-01-02T03:04:05Z; name another file"),
+        "{failure}"
+    );
     assert_eq!(fs::read_to_string(case.file()).unwrap(), text);
 }
 
@@ -345,30 +419,37 @@ fn files_that_are_no_calibration_of_this_board_are_refused() {
     });
     other.save(&case.file()).unwrap();
     let failure = case.run(&mut Script::new()).unwrap_err();
-    assert!(failure.message().ends_with("begun with nucleo 0042, this is simulated; name another file with --out"), "{failure}");
+    assert!(
+        failure
+            .message()
+            .ends_with("begun with nucleo 0042, this is simulated; name another file with --out"),
+        "{failure}"
+    );
     other.schema = "bowden-calibration/2".to_owned();
     other.save(&case.file()).unwrap();
     let failure = case.run(&mut Script::new()).unwrap_err();
-    assert!(failure.message().contains("schema: got `bowden-calibration/2`, expected `bowden-calibration/1`"), "{failure}");
+    assert!(
+        failure.message().contains("schema: got `bowden-calibration/2`, expected `bowden-calibration/1`"),
+        "{failure}"
+    );
     fs::write(case.file(), "schema = \"bowden-calibration/1\"\nzero = 3\n").unwrap();
     let failure = case.run(&mut Script::new()).unwrap_err();
     assert_eq!(failure.class(), FailureClass::BadInput);
-    assert!(failure.message().contains("calibration.toml:2: no calibration: unknown field `zero`"), "{failure}");
+    assert!(
+        failure.message().contains("calibration.toml:2: no calibration: unknown field `zero`"),
+        "{failure}"
+    );
 }
 
 #[test]
 fn a_pretension_that_is_off_is_refused_or_adopted() {
     // The same joint, and a board that is told of 20 N.
-    let told = |case: &mut Case| {
-        let index = case.session.parameters().find("tendon.pretension").unwrap().index;
-        case.session.replace_parameters(&[(index, 20.0)]).unwrap();
-    };
     let mut case = Case::new("sim");
-    told(&mut case);
+    case.told("tendon.pretension", 20.0);
     let reason = case.refused(&mut Script::new().with("The mean is", &["no"]));
     assert!(reason.contains("N above tendon.pretension; loosen the tendons"), "{reason}");
     let mut case = Case::new("sim");
-    told(&mut case);
+    case.told("tendon.pretension", 20.0);
     let (sheet, parameters) = case.calibrated(&mut Script::new().with("The mean is", &["yes"]));
     let pretension = sheet.pretension.unwrap();
     assert!(pretension.adopted && (pretension.mean_n - 30.0).abs() < 0.3, "{pretension:?}");

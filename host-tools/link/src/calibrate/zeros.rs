@@ -12,11 +12,14 @@ use std::collections::BTreeMap;
 
 use super::Trouble;
 use super::bench::{Bench, CHANNELS, V_PER_CODE, short};
-use super::look::Channel;
+use super::look::{Channel, Look};
 use super::sheet::{Level, Sheet, Zeros};
 
 /// Drift that is allowed whatever the noise, codes.
 const DRIFT_CODES: f64 = 1.0;
+
+/// Distance from its zero at which a channel without load may be later, codes: 1 % of the converter's range.
+const MOVED_CODES: f64 = 41.0;
 
 /// Standard errors that are allowed.
 const SIGMAS: f64 = 6.0;
@@ -47,12 +50,29 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
     Ok(())
 }
 
+/// Refuses channels that are not at their zeros any more, with the tendons off: these were on when the zeros were measured, or are now.
+pub(super) fn still_there(bench: &Bench, sheet: &Sheet, look: &Look) -> Result<(), Trouble> {
+    let zeros = sheet.zeros.iter().flat_map(|zeros| &zeros.tension);
+    for (name, zero) in zeros {
+        let cell = CHANNELS.iter().position(|channel| channel == name).unwrap_or(0);
+        let codes = look.tension[cell].mean() - zero.mean;
+        if codes.abs() > MOVED_CODES {
+            return Err(Trouble::Refused(format!(
+                "{name}: {codes:+.1} codes from its zero; take the tendons off, and if they are off, remove {} and begin again: they \
+                 were on when the zeros were measured",
+                bench.file.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// A channel as the file keeps it.
 pub(super) fn level(channel: &Channel) -> Level {
     Level { mean: short(channel.mean()), spread: short(channel.spread()), samples: channel.samples() }
 }
 
-/// Refuses a channel that is restless or dead; `what` names it in messages.
+/// Refuses a channel that is restless, dead or at a rail.
 pub(super) fn check_rest(bench: &Bench, cell: usize, channel: &Channel, gain_n: f64) -> Result<(), Trouble> {
     let (name, mean_v) = (CHANNELS[cell], channel.mean() * V_PER_CODE);
     let (low_v, high_v) = (bench.value("tension.rail_low")?, bench.value("tension.rail_high")?);

@@ -13,8 +13,7 @@ const PERCENT_OFF: f64 = 3.0;
 const DEFAULT_SEED: u64 = 1;
 
 /// What to do about a name that cannot be used.
-const NEXT: &str =
-    "name it sim, or sim:EFFECT[:STRENGTH][,...][,seed=N][,swap=f1-f3][,dead=f2][,reversed=motor] with effects of `virtual-bench effects`";
+const NEXT: &str = "name it sim, or sim:EFFECT[:STRENGTH][,...][,seed=N][,swap=f1-f3][,dead=f2][,reversed=motor] with effects of `virtual-bench effects`";
 
 /// The simulated joint as it really is.
 #[derive(Clone, Debug, PartialEq)]

@@ -65,7 +65,8 @@ impl SimJoint {
             Some(counts) => counts.map(f64::from),
             None => [zero("encoder.input.zero").into(), zero("encoder.joint.zero").into()],
         };
-        let mut joint = Self { bench, bridge: Bridge::Open, zeros, wiring, encoder_sequence: 0, frames: [0; 2] };
+        let mut joint =
+            Self { bench, bridge: Bridge::Open, zeros, wiring, encoder_sequence: 0, frames: [0; 2] };
         joint.read_encoders();
         Ok(joint)
     }

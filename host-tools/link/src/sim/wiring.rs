@@ -49,9 +49,9 @@ impl Wiring {
         match key {
             "swap" if value == "encoders" => self.encoders_swapped = true,
             "swap" => {
-                let (one, other) = value
-                    .split_once('-')
-                    .ok_or_else(|| format!("swap: got `{value}`, expected two cells such as f1-f3, or encoders"))?;
+                let (one, other) = value.split_once('-').ok_or_else(|| {
+                    format!("swap: got `{value}`, expected two cells such as f1-f3, or encoders")
+                })?;
                 self.cell.swap(cell(one)?, cell(other)?);
             }
             "dead" => self.cell[cell(value)?] = None,
@@ -66,7 +66,8 @@ impl Wiring {
                     Some([input.parse().ok()?, joint.parse().ok()?])
                         .filter(|counts: &[u16; 2]| counts.iter().all(|count| *count <= LARGEST_COUNT))
                 });
-                let expected = || format!("mounted: got `{value}`, expected counts 0 to 4095 such as 300-3500");
+                let expected =
+                    || format!("mounted: got `{value}`, expected counts 0 to 4095 such as 300-3500");
                 self.mounted_counts = Some(counts.ok_or_else(expected)?);
             }
             _ => return Ok(false),

@@ -11,7 +11,9 @@ const WEIGHT_N: f64 = 4.0 * 9.81;
 /// Does what a question asks for, at the bench, and answers it.
 fn person(question: &str, board: &mut Board, weighed: &mut bool) -> Option<String> {
     let bench = board.by_hand();
-    let cell = |text: &str| text.chars().next().and_then(|digit| digit.to_digit(10)).map_or(0, |cell| cell as usize - 1);
+    let cell = |text: &str| {
+        text.chars().next().and_then(|digit| digit.to_digit(10)).map_or(0, |cell| cell as usize - 1)
+    };
     let cell = question.split("load cell f").nth(1).map_or(0, cell);
     let load = |load_n: f64| {
         let mut loads_n = [0.0; 4];
