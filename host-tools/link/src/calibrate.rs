@@ -99,7 +99,9 @@ const STEPS: [Step; 6] = [
 /// The steps, one line each.
 #[must_use]
 pub fn steps() -> String {
-    STEPS.iter().enumerate().map(|(index, step)| format!("{} {}\n", index + 1, step.title)).collect()
+    let lines: Vec<String> =
+        STEPS.iter().enumerate().map(|(index, step)| format!("{} {}\n", index + 1, step.title)).collect();
+    lines.concat()
 }
 
 /// Calibrates a board: the steps that the file does not have yet, then sets what was found and signs it off.

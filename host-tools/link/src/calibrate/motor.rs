@@ -100,8 +100,7 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
     restored?;
     let resistance_ohm = 0.5 * (positive_ohm + negative_ohm);
     let apart_ohm = (positive_ohm - negative_ohm).abs();
-    // A value that is not finite is refused as well.
-    if !(apart_ohm <= APART * resistance_ohm) {
+    if apart_ohm > APART * resistance_ohm || resistance_ohm <= 0.0 {
         return Err(Trouble::Refused(format!(
             "R is {} ohm one way and {} ohm the other, expected both within 20 %; look for a loose contact at the motor",
             short(positive_ohm),

@@ -40,8 +40,9 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
     ends_fit(bench, &tension_n)?;
     let mean_n = short(tension_n.values().sum::<f64>() / fitted.len().max(1) as f64);
     let adopted = !fitted.is_empty() && is_new(bench, mean_n)?;
-    let lines: String = tension_n.iter().map(|(name, mean_n)| format!("  {name}: {mean_n} N\n")).collect();
-    bench.dialog.show(&lines)?;
+    for (name, mean_n) in &tension_n {
+        bench.dialog.show(&format!("  {name}: {mean_n} N\n"))?;
+    }
     let found = Pretension { at: at.to_owned(), mean_n, tension_n, spread_n, adopted };
     if adopted {
         bench.set(&BTreeMap::from([("tendon.pretension".to_owned(), mean_n)]))?;

@@ -41,11 +41,10 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
             short(off_a)
         )));
     }
-    let lines: String = tension
-        .iter()
-        .map(|(name, zero)| format!("  {name}: {} codes, spread {}\n", short(zero.mean), short(zero.spread)))
-        .collect();
-    bench.dialog.show(&lines)?;
+    for (name, zero) in &tension {
+        let line = format!("  {name}: {} codes, spread {}\n", short(zero.mean), short(zero.spread));
+        bench.dialog.show(&line)?;
+    }
     sheet.zeros = Some(Zeros { at: at.to_owned(), current: level(&look.current), tension });
     Ok(())
 }

@@ -47,7 +47,7 @@ impl Hand for SimHand {
                 bench.hold_arm(self.tendons_off.then_some(0.0));
             }
             Act::HangWeight { cell, mass_kg } => {
-                bench.set_cell_load_n(load(cell, mass_kg * GRAVITY_M_PER_S2))
+                bench.set_cell_load_n(load(cell, mass_kg * GRAVITY_M_PER_S2));
             }
             Act::Pull { cell } => bench.set_cell_load_n(load(cell, PULL_N)),
             Act::TurnInput => bench.hold_input(Some(bench.theta_in_rad() + TURN_RAD)),
