@@ -7,11 +7,11 @@ use std::process::Stdio;
 
 use crate::{bowden, command, result_of};
 
-/// Zeros, and the four cells pulled.
-const FIRST: &str = "\n\n\n\n\n";
+/// Zeros, and the four cells pulled and let go.
+const FIRST: &str = "\n\n\n\n\n\n\n\n\n";
 
-/// 2 kg on f1 and f3, encoders, tendons on, parameters, supply, parameters, store, signature.
-const REST: &str = "f1\n2\n\nf3\n2\n\ndone\n\n\n\nyes\n\nyes\nyes\nAda Lovelace\n";
+/// 2 kg on f1 and f3, both shafts turned and let go, tendons on, parameters, supply, parameters, store, signature.
+const REST: &str = "f1\n2\n\n\nf3\n2\n\n\ndone\n\n\n\n\n\nyes\n\nyes\nyes\nAda Lovelace\n";
 
 fn calibrate(folder: &Path, port: &str, answers: &str) -> (i32, String, String) {
     let mut child = command(folder, &["calibrate", "--port", port, "--out", "c.toml"])

@@ -89,6 +89,11 @@ impl Bench<'_> {
         Ok(())
     }
 
+    /// Has everything let go of.
+    pub(super) fn let_go(&mut self, text: &str) -> Result<(), Trouble> {
+        self.have(text, Act::LetGo)
+    }
+
     /// Looks at all channels.
     pub(super) fn look(&mut self) -> Result<Look, Trouble> {
         Look::new(self.session, self.stop)

@@ -38,7 +38,7 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
         );
         bench.have(&text, Act::Pull { cell: *cell })?;
         let change = bench.wait_for(&before, |change| largest(change, &fitted).1.abs() >= CHANGE_CODES);
-        bench.hand.act(Act::LetGo);
+        bench.let_go("Let go of the load cell.")?;
         match judge(*cell, change?, &fitted) {
             Ok(codes) => {
                 bench.dialog.show(&format!("  input {name}: {codes:+.1} codes\n"))?;

@@ -60,7 +60,7 @@ fn turned(bench: &mut Bench, sheet: &Sheet, index: usize) -> Result<f64, Trouble
     bench.have(&text, [Act::TurnInput, Act::TurnJoint][index])?;
     let change =
         bench.wait_for(&before, |change| change.encoder.iter().any(|counts| counts.abs() >= TURN_COUNTS));
-    bench.hand.act(Act::LetGo);
+    bench.let_go(&format!("Let go of the {shaft}; everything at rest."))?;
     let Some(change) = change? else {
         return Err(Trouble::Refused(format!(
             "encoder {name}: neither encoder turned by {TURN_COUNTS} counts; turn the {shaft}, or look for a loose coupling or a \

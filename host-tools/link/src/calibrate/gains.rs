@@ -60,9 +60,8 @@ pub(super) fn run(bench: &mut Bench, sheet: &mut Sheet, at: &str) -> Result<(), 
         let mass_kg = number(bench.dialog, &format!("Mass of the weight for {name}, kg?"), MASS_KG, "kg")?;
         let text = format!("Hang {mass_kg} kg on load cell {name} ({place}) and let it come to rest.");
         bench.have(&text, Act::HangWeight { cell, mass_kg })?;
-        let look = bench.look();
-        bench.hand.act(Act::LetGo);
-        let look = look?;
+        let look = bench.look()?;
+        bench.let_go(&format!("Take the weight off {name}."))?;
         refused.remove(name);
         gains.remove(name);
         match judge(bench, &zeros.tension, cell, mass_kg, &look).and_then(|gain| confirmed(bench, name, gain))

@@ -29,8 +29,12 @@ fn person(question: &str, board: &mut Board, weighed: &mut bool) -> Option<Strin
     } else if question.contains("pull at load cell") {
         bench.set_cell_load_n(load(12.0));
         ""
-    } else if question.starts_with("Which load cell") {
+    } else if question.starts_with("Let go") || question.starts_with("Take the weight off") {
         bench.set_cell_load_n([0.0; 4]);
+        bench.hold_input(None);
+        bench.hold_arm(Some(0.0));
+        ""
+    } else if question.starts_with("Which load cell") {
         if std::mem::replace(weighed, true) { "done" } else { "f2" }
     } else if question.starts_with("Mass of the weight") {
         MASS
@@ -38,11 +42,9 @@ fn person(question: &str, board: &mut Board, weighed: &mut bool) -> Option<Strin
         bench.set_cell_load_n(load(WEIGHT_N));
         ""
     } else if question.contains("turn the input pulley alone") {
-        bench.hold_arm(Some(0.0));
         bench.hold_input(Some(0.5));
         ""
     } else if question.contains("turn the joint alone") {
-        bench.hold_input(None);
         bench.hold_arm(Some(0.5));
         ""
     } else if question.starts_with("Set these") || question.starts_with("Store") {
