@@ -457,13 +457,17 @@ fn a_pretension_that_is_off_is_refused_or_adopted() {
 }
 
 #[test]
-fn what_is_written_reads_back() {
-    let case = Case::new("sim");
-    let path = case.file();
-    let (sheet, _) = case.calibrated(&mut Script::new());
-    sheet.save(&path.with_extension("again")).unwrap_err();
+fn what_is_written_reads_back_and_has_time_and_spread_of_every_step() {
+    let (sheet, _) = Case::new("sim").calibrated(&mut Script::new());
     let folder = tempfile::tempdir().unwrap();
-    let again = folder.path().join("again.toml");
-    sheet.save(&again).unwrap();
-    assert_eq!(Sheet::load(&again).unwrap(), sheet);
+    let file = folder.path().join("again.toml");
+    sheet.save(&file).unwrap();
+    assert_eq!(Sheet::load(&file).unwrap(), sheet);
+    let text = fs::read_to_string(&file).unwrap();
+    let count = |line: &str| text.lines().filter(|found| found.starts_with(line)).count();
+    // Six steps and the signature. Current, four zeros, four weights and two encoders have a spread each.
+    assert_eq!(count("at = \"2030-01-02T03:04:05Z\""), 7, "{text}");
+    assert_eq!((count("spread = "), count("samples = 5000")), (11, 11), "{text}");
+    let others = ["spread_n_per_code = ", "spread_ohm = ", "[pretension.spread_n]"].map(count);
+    assert_eq!(others, [4, 1, 1], "{text}");
 }
