@@ -7,7 +7,7 @@ use crate::cpu::Cpu;
 use crate::elf::{Image, ImageSizes};
 use crate::encoders::{EncoderMounting, EncoderPart};
 use crate::error::BoardError;
-use crate::faults::{EncoderAt, Injection};
+use crate::faults::{Altered, BridgeEvents, EncoderAt, Injection, Peaks};
 use crate::machine::Counters;
 use crate::measure::{Measurement, Spread};
 use crate::memory_map::{FLASH, WRITABLE_FLASH};
@@ -474,6 +474,7 @@ impl Board {
                 Injection::EncoderDmaError(at) if on => {
                     machine.bus.fail_encoder_dma(usize::from(at == EncoderAt::Joint));
                 }
+                Injection::LegLow(leg) => machine.bus.set_leg_low(leg, on, now),
                 Injection::FlashDamage if on => machine.bus.fetch_damaged(now),
                 Injection::ProcessorSupply => machine.bus.set_supply_low(on, now),
                 Injection::Crystal => machine.bus.set_crystal(!on, now),
@@ -483,6 +484,24 @@ impl Board {
             }
         }
         machine.refresh();
+    }
+
+    /// What injections have changed since power was first applied.
+    pub fn altered(&self) -> Altered {
+        self.bus().altered()
+    }
+
+    /// Largest values that the bench had since the last call.
+    pub fn take_peaks(&mut self) -> Peaks {
+        let now_s = self.time_s();
+        let rig = &mut self.bus_mut().rig;
+        rig.advance(now_s);
+        rig.take_peaks()
+    }
+
+    /// When the bridge opened and closed, since power was first applied.
+    pub fn bridge_events(&self) -> BridgeEvents {
+        self.bus().rig.bridge_events()
     }
 
     /// Holds the core as a debugger does, or lets it go on; TIM1 stands meanwhile if `DBG_TIM1_STOP` is set, and other timers,

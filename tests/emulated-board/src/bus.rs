@@ -2,11 +2,14 @@
 
 mod address_map;
 
+use std::cell::Cell;
+
 use virtual_bench::Bridge;
 
 use crate::analog;
 use crate::clock::Clock;
 use crate::error::{BoardError, Refusal};
+use crate::faults::Altered;
 use crate::peripherals::NEVER;
 use crate::peripherals::adc::{Adc, Common, Need};
 use crate::peripherals::advanced_timer::{AdvancedTimer, Leg};
@@ -90,6 +93,10 @@ pub(crate) struct Bus {
     /// Encoders whose SPI asks DMA for nothing.
     pub stalled_encoders: [bool; 2],
     failing_encoders: [bool; 2],
+    /// Requests of the encoders' SPI that were held back; counted where DMA only looks.
+    withheld_requests: [Cell<u64>; 2],
+    /// Legs of the bridge whose high switch stays open.
+    legs_low: [bool; 2],
     /// The processor's supply is below the levels of its voltage detector.
     supply_low: bool,
     /// A reset that a peripheral asks for.
@@ -134,6 +141,8 @@ impl Bus {
             driver_wakes: NEVER,
             stalled_encoders: [false; 2],
             failing_encoders: [false; 2],
+            withheld_requests: [Cell::new(0), Cell::new(0)],
+            legs_low: [false; 2],
             supply_low: false,
             reset_request: None,
             failure: None,
@@ -352,12 +361,14 @@ impl Bus {
             return self.adc[index].request();
         }
         for (index, [receive, transmit]) in REQUEST_SPI.iter().enumerate() {
-            if request == *receive {
-                return self.spi[index].receive_request() && !self.stalled_encoders[index];
-            }
-            if request == *transmit {
-                return self.spi[index].transmit_request() && !self.stalled_encoders[index];
-            }
+            let asks = match request {
+                request if request == *receive => self.spi[index].receive_request(),
+                request if request == *transmit => self.spi[index].transmit_request(),
+                _ => continue,
+            };
+            let withheld = &self.withheld_requests[index];
+            withheld.set(withheld.get() + u64::from(asks && self.stalled_encoders[index]));
+            return asks && !self.stalled_encoders[index];
         }
         false
     }
@@ -385,9 +396,28 @@ impl Bus {
         let due = (0..2).find(|index| self.failing_encoders[*index] && request == REQUEST_SPI[*index][0]);
         if let Some(index) = due {
             self.failing_encoders[index] = false;
+            self.rig.altered.dma_errors[index] += 1;
             self.dma.fail(channel);
         }
         due.is_some()
+    }
+
+    /// What injections have changed.
+    pub(crate) fn altered(&self) -> Altered {
+        Altered {
+            withheld_requests: self.withheld_requests.each_ref().map(Cell::get),
+            clock_losses: self.rcc.losses(),
+            host_polls: self.host.polls_left_out,
+            line_states: self.host.line_states,
+            host_bytes: self.host.bytes_taken,
+            ..self.rig.altered
+        }
+    }
+
+    /// The high switch of leg `index` stays open, or works again.
+    pub(crate) fn set_leg_low(&mut self, index: usize, low: bool, now: u64) {
+        self.legs_low[index % 2] = low;
+        self.bridge_changed(now);
     }
 
     /// Counts an item as moved.
@@ -419,6 +449,8 @@ impl Bus {
 
     /// The processor's supply falls below the levels of its voltage detector, or is back.
     pub(crate) fn set_supply_low(&mut self, low: bool, now: u64) {
+        let fell = low && !self.supply_low && self.pwr.detects_supply();
+        self.rig.altered.supply_dips += u64::from(fell);
         self.supply_low = low;
         if low && self.pwr.detects_supply() && self.syscfg.breaks_by_supply() {
             self.tim1.system_break();
@@ -427,6 +459,7 @@ impl Bus {
     }
 
     fn break_by_flash(&mut self, now: u64) {
+        self.rig.altered.flash_errors += 1;
         if self.syscfg.breaks_by_flash() {
             self.tim1.system_break();
             self.tim1_changed(now);
@@ -505,6 +538,11 @@ impl Bus {
         self.tim1.set_break_pin(!(connected && self.fault_line_is_low()), now);
     }
 
+    /// Whether the timer hears the fault line, with the gate driver awake.
+    fn hears_fault_line(&self) -> bool {
+        self.driver_awake && self.pin_mode(wiring::BRIDGE_FAULT) == Mode::Alternate(wiring::BRIDGE_ALTERNATE)
+    }
+
     fn drive_fault_pin(&mut self, now: u64) {
         let pin = wiring::BRIDGE_FAULT;
         let level = !self.fault_line_is_low();
@@ -520,6 +558,7 @@ impl Bus {
     pub(crate) fn set_bridge_fault(&mut self, fault: bool, now: u64) {
         if self.bridge_fault != fault {
             self.bridge_fault = fault;
+            self.rig.altered.fault_lines += u64::from(fault && self.hears_fault_line());
             self.drive_fault_pin(now);
         }
     }
@@ -550,11 +589,15 @@ impl Bus {
         }
         // One leg alone carries no current.
         let bridge = match legs {
-            [Leg::Switching(a), Leg::Switching(b)] if self.driver_is_awake() => Bridge::Duty(a - b),
+            [Leg::Switching(a), Leg::Switching(b)] if self.driver_is_awake() => {
+                let [at_a, at_b] = self.legs_low;
+                Bridge::Duty(if at_a { 0.0 } else { a } - if at_b { 0.0 } else { b })
+            }
             _ => Bridge::Open,
         };
         let now_s = self.seconds(now);
         self.rig.set_bridge(now_s, bridge);
+        self.rig.bridge_differs = self.legs_low != [false; 2];
     }
 
     /// A debugger holds the core, or lets it go on.

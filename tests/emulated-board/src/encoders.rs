@@ -3,6 +3,7 @@
 //! The angle is sampled when chip select falls. A master that is too fast or in the wrong clock mode is a broken design
 //! and ends the run; the minimum time of an AMT22 between two readings is not checked.
 
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use crate::peripherals::spi::ClockMode;
@@ -59,6 +60,8 @@ pub(crate) struct EncoderFault {
     pub last_bit: bool,
     /// Nothing drives the line: it reads ones.
     pub silent: bool,
+    /// Probability of a frame without an answer.
+    pub lost: f64,
     /// AS5045: magnet out of range (status bits), field lost.
     pub magnet_lost: bool,
 }
@@ -98,6 +101,8 @@ pub(crate) struct Encoder {
     selected_at_s: Option<f64>,
     last_end_s: Option<f64>,
     random: u64,
+    /// Frames by which the count is late, and the counts in between.
+    late: (usize, VecDeque<u32>),
 }
 
 impl Encoder {
@@ -111,6 +116,7 @@ impl Encoder {
             selected_at_s: None,
             last_end_s: None,
             random: seed | 1,
+            late: (0, VecDeque::new()),
         }
     }
 
@@ -132,21 +138,41 @@ impl Encoder {
         (self.random.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Chip select falls: the angle is sampled.
-    pub(crate) fn select(&mut self, at_s: f64, angle_rad: f64) {
+    /// Lets the count be late by this many frames.
+    pub(crate) fn set_late(&mut self, frames: u32) {
+        self.late = (frames as usize, VecDeque::new());
+    }
+
+    /// The bits that answer a frame, left-aligned.
+    fn word(&self, count: u32, magnet_lost: bool) -> u32 {
+        match self.mounting.part {
+            EncoderPart::Amt22 => u32::from(amt22_frame(count)) << 16 | 0xffff,
+            EncoderPart::As5045 => 1 << 31 | as5045_frame(count, magnet_lost) << 13 | 0x1fff,
+        }
+    }
+
+    /// Chip select falls: the angle is sampled, count `own`; an injection elsewhere may have it show `shown`.
+    ///
+    /// Returns whether the frame differs from what it would be without a fault.
+    pub(crate) fn select(&mut self, at_s: f64, own: u32, shown: u32) -> bool {
         self.selected_at_s = Some(at_s);
         self.last_end_s = None;
-        let mut count = i64::from(count_at(self.mounting, angle_rad)) + i64::from(self.fault.jump);
+        let mut count = i64::from(shown) + i64::from(self.fault.jump);
         if self.fault.noise_counts > 0 {
             let span = f64::from(2 * self.fault.noise_counts + 1);
             count += (self.uniform() * span).floor() as i64 - i64::from(self.fault.noise_counts);
         }
-        let count = count.rem_euclid(i64::from(COUNTS_PER_TURN)) as u32;
+        let mut count = count.rem_euclid(i64::from(COUNTS_PER_TURN)) as u32;
+        let (frames, counts) = &mut self.late;
+        if *frames > 0 {
+            counts.push_back(count);
+            if counts.len() > *frames + 1 {
+                counts.pop_front();
+            }
+            count = counts.front().copied().unwrap_or(count);
+        }
         let count = self.fault.stuck_at.unwrap_or(count) % COUNTS_PER_TURN;
-        self.shift = match self.mounting.part {
-            EncoderPart::Amt22 => u32::from(amt22_frame(count)) << 16 | 0xffff,
-            EncoderPart::As5045 => 1 << 31 | as5045_frame(count, self.fault.magnet_lost) << 13 | 0x1fff,
-        };
+        self.shift = self.word(count, self.fault.magnet_lost);
         if self.fault.bit_error > 0.0 {
             for bit in 0..32 {
                 if self.uniform() < self.fault.bit_error {
@@ -160,9 +186,15 @@ impl Encoder {
                 EncoderPart::As5045 => 1 << 13,
             };
         }
-        if self.fault.silent {
+        if self.fault.silent || self.fault.lost > 0.0 && self.uniform() < self.fault.lost {
             self.shift = u32::MAX;
         }
+        // The bits that the part sends: behind them the line idles.
+        let sent = match self.mounting.part {
+            EncoderPart::Amt22 => 16,
+            EncoderPart::As5045 => 19,
+        };
+        (self.shift ^ self.word(own, false)) >> (32 - sent) != 0
     }
 
     /// Chip select rises.
@@ -239,6 +271,12 @@ mod tests {
         Encoder::new("joint encoder", mounting, 1)
     }
 
+    /// Selects the encoder at this angle.
+    fn sample(encoder: &mut Encoder, angle_rad: f64) -> bool {
+        let count = count_at(encoder.mounting, angle_rad);
+        encoder.select(0.0, count, count)
+    }
+
     #[test]
     fn frames_worked_by_hand() {
         // 0xabc << 2 = 10 1010 1111 0000: ones at 13 11 9 7 5, five, so K1 = 0; at 6 4, two, so K0 = 1.
@@ -261,19 +299,19 @@ mod tests {
     #[test]
     fn two_bytes_make_a_frame_and_short_waits_are_errors() {
         let mut encoder = amt22(0xabc);
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert_eq!(encoder.exchange(8, 3.0e-6, 9.0e-6, MODE0), Ok(0x6a));
         assert_eq!(encoder.exchange(8, 11.5e-6, 17.5e-6, MODE0), Ok(0xf0));
         assert_eq!(encoder.deselect(20.5e-6), Ok(()));
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert!(encoder.exchange(8, 2.9e-6, 9.0e-6, MODE0).is_err(), "2.9 us behind chip select");
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         encoder.exchange(8, 3.0e-6, 9.0e-6, MODE0).expect("first byte");
         assert!(encoder.exchange(8, 11.4e-6, 17.4e-6, MODE0).is_err(), "2.4 us between bytes");
         assert!(encoder.deselect(11.9e-6).is_err(), "2.9 us to the release");
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert!(encoder.exchange(8, 3.0e-6, 6.0e-6, MODE0).is_err(), "2.67 MHz");
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         let mode1 = ClockMode { second_edge: true, ..MODE0 };
         assert!(encoder.exchange(8, 3.0e-6, 9.0e-6, mode1).is_err());
     }
@@ -283,7 +321,7 @@ mod tests {
         let mounting = EncoderMounting { part: EncoderPart::As5045, count_at_zero: 0x123, reversed: false };
         let mut encoder = Encoder::new("joint encoder", mounting, 1);
         let mode2 = ClockMode { idle_high: true, ..MODE0 };
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         let bytes: Vec<u16> = (0..3)
             .map(|k| {
                 let start = 1e-6 + 13e-6 * f64::from(k);
@@ -292,7 +330,7 @@ mod tests {
             .collect();
         // 1, then 0001 0010 0011 10 0001 of the frame, then ones: the line idles high.
         assert_eq!(bytes, [0b1000_1001, 0b0001_1100, 0b0011_1111]);
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         for wrong in
             [MODE0, ClockMode { second_edge: true, ..MODE0 }, ClockMode { second_edge: true, ..mode2 }]
         {
@@ -304,19 +342,44 @@ mod tests {
     fn faults_change_the_frame() {
         let mut encoder = amt22(0);
         encoder.fault.stuck_at = Some(77);
-        encoder.select(0.0, 1.0);
+        sample(&mut encoder, 1.0);
         assert_eq!(encoder.shift >> 16, u32::from(amt22_frame(77)));
         encoder.fault = EncoderFault { jump: 5, ..EncoderFault::default() };
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert_eq!(encoder.shift >> 16, u32::from(amt22_frame(5)));
         encoder.fault = EncoderFault { silent: true, ..EncoderFault::default() };
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert_eq!(encoder.exchange(8, 3.0e-6, 9.0e-6, MODE0), Ok(0xff));
         encoder.fault = EncoderFault { last_bit: true, ..EncoderFault::default() };
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert_eq!(encoder.shift >> 16, u32::from(amt22_frame(0)) ^ 1);
         encoder.fault = EncoderFault { bit_error: 0.5, ..EncoderFault::default() };
-        encoder.select(0.0, 0.0);
+        sample(&mut encoder, 0.0);
         assert_ne!(encoder.shift >> 16, u32::from(amt22_frame(0)));
+    }
+
+    #[test]
+    fn a_frame_counts_as_altered_where_its_bits_differ() {
+        let mut encoder = amt22(100);
+        assert!(!sample(&mut encoder, 0.3));
+        encoder.fault.stuck_at = Some(100);
+        assert!(!sample(&mut encoder, 0.0), "it stands where it is");
+        assert!(sample(&mut encoder, 0.3));
+        encoder.fault = EncoderFault { lost: 0.5, ..EncoderFault::default() };
+        let lost = (0..1000).filter(|_| sample(&mut encoder, 0.3)).count();
+        // Half of them, with a standard deviation of 16.
+        assert!((420..580).contains(&lost), "{lost}");
+    }
+
+    #[test]
+    fn a_late_count_is_that_of_so_many_frames_before() {
+        let mut encoder = amt22(0);
+        encoder.set_late(2);
+        let mut shown = Vec::new();
+        for count in 10..16 {
+            encoder.select(0.0, count, count);
+            shown.push(encoder.shift >> 18 & 0xfff);
+        }
+        assert_eq!(shown, [10, 10, 10, 11, 12, 13]);
     }
 }

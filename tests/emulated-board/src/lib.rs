@@ -59,7 +59,7 @@ pub use board::{Board, BoardBuilder, FirmwareUse, PwmState, TickTiming};
 pub use elf::ImageSizes;
 pub use encoders::{COUNTS_PER_TURN, EncoderMounting, EncoderPart};
 pub use error::BoardError;
-pub use faults::{Cable, EncoderAt, Injection, Rail, TensionAt};
+pub use faults::{Altered, BridgeEvents, Cable, EncoderAt, Injection, Peaks, Rail, TensionAt};
 pub use machine::Counters;
 pub use measure::{Measurement, Spread};
 pub use peripherals::flash::Torn;

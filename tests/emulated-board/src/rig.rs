@@ -3,17 +3,19 @@
 //! The bench is stepped only when somebody looks or the bridge changes, so that it costs nothing in between; it lags the
 //! board by less than one step.
 
+use std::collections::VecDeque;
+
 use virtual_bench::{BenchConfig, BenchError, Bridge, Channel, ConcealedEffect, LiveBench};
 
 use crate::analog;
 use crate::encoders::{Encoder, EncoderMounting, count_at};
-use crate::faults::{Cable, EncoderAt, Injection, Rail, TensionAt};
+use crate::faults::{Altered, BridgeEvents, Cable, EncoderAt, Injection, Peaks, Rail, TensionAt};
 
 /// Volts of a broken wire at the low and at the high rail.
 const RAIL_V: [f64; 2] = [0.02, 3.28];
 
 /// What a test does to one tension channel.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct TensionFault {
     wire: Option<Rail>,
     offset_n: f64,
@@ -21,11 +23,56 @@ struct TensionFault {
     stuck_v: Option<f64>,
     /// Channel whose sensor is plugged in here instead.
     plugged_in: Option<usize>,
+    noise_n: f64,
+    late: Option<Late>,
+}
+
+/// A reading that comes late.
+#[derive(Debug, Clone, Default)]
+struct Late {
+    delay_s: f64,
+    /// Times \[s\] and readings \[N\], the oldest first; the first one is the present reading.
+    readings: VecDeque<(f64, f64)>,
+}
+
+impl Late {
+    /// Takes a new reading in and gives the late one.
+    fn pass(&mut self, at_s: f64, reading: f64) -> f64 {
+        self.readings.push_back((at_s, reading));
+        while self.readings.get(1).is_some_and(|(then_s, _)| *then_s <= at_s - self.delay_s) {
+            self.readings.pop_front();
+        }
+        self.readings.front().map_or(reading, |(_, then)| *then)
+    }
+}
+
+/// What a test does to the current channel.
+#[derive(Debug, Clone)]
+struct CurrentFault {
+    offset_a: f64,
+    gain: f64,
+    noise_a: f64,
+    wire: Option<Rail>,
+    stuck_v: Option<f64>,
+}
+
+impl Default for CurrentFault {
+    fn default() -> Self {
+        Self { offset_a: 0.0, gain: 1.0, noise_a: 0.0, wire: None, stuck_v: None }
+    }
 }
 
 impl Default for TensionFault {
     fn default() -> Self {
-        Self { wire: None, offset_n: 0.0, gain: 1.0, stuck_v: None, plugged_in: None }
+        Self {
+            wire: None,
+            offset_n: 0.0,
+            gain: 1.0,
+            stuck_v: None,
+            plugged_in: None,
+            noise_n: 0.0,
+            late: None,
+        }
     }
 }
 
@@ -40,6 +87,17 @@ pub(crate) enum Input {
     Bus,
 }
 
+impl Input {
+    /// Place in [`Altered::conversions`].
+    fn index(self) -> usize {
+        match self {
+            Self::Tension(index) => index,
+            Self::Current => 4,
+            Self::Bus => 5,
+        }
+    }
+}
+
 /// Bench and sensors.
 #[derive(Debug, Clone)]
 pub(crate) struct Rig {
@@ -52,8 +110,20 @@ pub(crate) struct Rig {
     /// Encoder at the input pulley and at the joint.
     pub encoders: [Encoder; 2],
     tension_faults: [TensionFault; 4],
-    current_offset_a: f64,
-    current_wire: Option<Rail>,
+    current_fault: CurrentFault,
+    bus_reading: f64,
+    encoders_swapped: bool,
+    /// A lead of the motor is open.
+    motor_open: bool,
+    /// The bridge makes another voltage than it was told to.
+    pub bridge_differs: bool,
+    pushed: bool,
+    /// Noise of injections, apart from that of the bench, which it leaves as it is.
+    noise: u64,
+    /// What injections have changed.
+    pub altered: Altered,
+    peaks: Peaks,
+    events: BridgeEvents,
 }
 
 const TENSIONS: [Channel; 4] = [Channel::F1, Channel::F2, Channel::F3, Channel::F4];
@@ -102,9 +172,17 @@ impl Rig {
                 Encoder::new("input encoder", input, seed ^ 0x5bd1_e995_0000_0001),
                 Encoder::new("joint encoder", joint, seed ^ 0x27d4_eb2f_1656_67c5),
             ],
-            tension_faults: [TensionFault::default(); 4],
-            current_offset_a: 0.0,
-            current_wire: None,
+            tension_faults: std::array::from_fn(|_| TensionFault::default()),
+            current_fault: CurrentFault::default(),
+            bus_reading: 1.0,
+            encoders_swapped: false,
+            motor_open: false,
+            bridge_differs: false,
+            pushed: false,
+            noise: seed ^ 0x9e37_79b9_7f4a_7c15 | 1,
+            altered: Altered::default(),
+            peaks: Peaks::default(),
+            events: BridgeEvents::default(),
         })
     }
 
@@ -128,12 +206,46 @@ impl Rig {
     pub(crate) fn advance(&mut self, time_s: f64) {
         let step_s = self.bench.config().step_s;
         let at_motor = match self.bridge {
+            Bridge::Duty(_) if self.motor_open => Bridge::Open,
             Bridge::Duty(duty) if self.motor_reversed => Bridge::Duty(-duty),
             other => other,
         };
+        let driven = matches!(self.bridge, Bridge::Duty(_));
+        let count = |condition: bool| u64::from(condition);
         while self.bench.time_s() + step_s <= time_s {
             self.bench.step(at_motor);
+            self.altered.motor_steps += count(driven && (self.motor_open || self.bridge_differs));
+            self.altered.cable_steps += count(self.pretension != [1.0; 2]);
+            self.altered.joint_steps += count(self.pushed);
+            let (peaks, bench) = (&mut self.peaks, &self.bench);
+            for (peak, tension_n) in peaks.tensions_n.iter_mut().zip(bench.tensions_n()) {
+                *peak = peak.max(tension_n);
+            }
+            peaks.angle_rad = peaks.angle_rad.max(bench.theta_out_rad().abs());
+            peaks.current_a = peaks.current_a.max(bench.current_a().abs());
         }
+    }
+
+    /// Largest values since the last call.
+    pub(crate) fn take_peaks(&mut self) -> Peaks {
+        std::mem::take(&mut self.peaks)
+    }
+
+    /// When the bridge opened and closed.
+    pub(crate) fn bridge_events(&self) -> BridgeEvents {
+        self.events
+    }
+
+    /// Standard normal noise: the sum of twelve uniform values (xorshift64*).
+    fn normal(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.noise ^= self.noise >> 12;
+            self.noise ^= self.noise << 25;
+            self.noise ^= self.noise >> 27;
+            sum += (self.noise.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
     }
 
     /// Moves the sheaths of cable a and b at `time_s` to these wrap angles \[rad\].
@@ -150,6 +262,17 @@ impl Rig {
     pub(crate) fn set_bridge(&mut self, time_s: f64, bridge: Bridge) {
         if bridge != self.bridge {
             self.advance(time_s);
+            match (self.bridge, bridge) {
+                (Bridge::Duty(_), Bridge::Open) => {
+                    self.events.openings += 1;
+                    self.events.opened_s = time_s;
+                }
+                (Bridge::Open, Bridge::Duty(_)) => {
+                    self.events.closings += 1;
+                    self.events.closed_s = time_s;
+                }
+                _ => {}
+            }
             self.bridge = bridge;
         }
     }
@@ -157,28 +280,59 @@ impl Rig {
     /// Chip select of encoder `index` falls.
     pub(crate) fn select_encoder(&mut self, index: usize, time_s: f64) {
         self.advance(time_s);
-        let angle = self.bench.sensed_angle_rad(ANGLES[index]);
-        self.encoders[index].select(time_s, angle);
+        let count_of = |index: usize| {
+            count_at(self.encoders[index].mounting, self.bench.sensed_angle_rad(ANGLES[index]))
+        };
+        let own = count_of(index);
+        let shown = if self.encoders_swapped { count_of(1 - index) } else { own };
+        let differs = self.encoders[index].select(time_s, own, shown);
+        self.altered.frames[index] += u64::from(differs);
     }
 
     /// Volts at `input` at `time_s`.
     pub(crate) fn volts(&mut self, input: Input, time_s: f64) -> f64 {
         self.advance(time_s);
-        match input {
-            Input::Tension(index) => {
-                let fault = self.tension_faults[index];
-                let sensor = TENSIONS[fault.plugged_in.unwrap_or(index)];
-                let tension_n = self.bench.sensed(sensor) * fault.gain + fault.offset_n;
-                fault.wire.map(rail_v).or(fault.stuck_v).unwrap_or_else(|| analog::tension_v(tension_n))
+        let (clean_v, shown_v) = match input {
+            Input::Tension(index) => self.tension_v(index, time_s),
+            Input::Current => self.current_v(),
+            Input::Bus => {
+                let shown_v = analog::bus_v(self.bus_reading * self.bench.supply_v());
+                (analog::bus_v(self.nominal_supply_v), shown_v)
             }
-            Input::Current => {
-                // The shunt is in the bridge's line to the motor: it sees the leads as the bridge does.
-                let sign = if self.motor_reversed { -1.0 } else { 1.0 };
-                let current_a = sign * self.bench.sensed(Channel::Current) + self.current_offset_a;
-                self.current_wire.map_or_else(|| analog::current_v(current_a), rail_v)
-            }
-            Input::Bus => analog::bus_v(self.bench.supply_v()),
+        };
+        let altered = &mut self.altered.conversions[input.index()];
+        *altered += u64::from(analog::code(clean_v) != analog::code(shown_v));
+        shown_v
+    }
+
+    /// Volts of a tension channel as they would be and as they are.
+    fn tension_v(&mut self, index: usize, time_s: f64) -> (f64, f64) {
+        let plugged_in = self.tension_faults[index].plugged_in;
+        let sensed_n = self.bench.sensed(TENSIONS[plugged_in.unwrap_or(index)]);
+        // The sensor that is not plugged in has not been read: its noise is left out.
+        let clean_n = plugged_in.map_or(sensed_n, |_| self.bench.tensions_n()[index]);
+        let noise_n = self.tension_faults[index].noise_n;
+        let noise_n = if noise_n > 0.0 { noise_n * self.normal() } else { 0.0 };
+        let fault = &mut self.tension_faults[index];
+        let mut shown_n = sensed_n * fault.gain + fault.offset_n + noise_n;
+        if let Some(late) = &mut fault.late {
+            shown_n = late.pass(time_s, shown_n);
         }
+        let shown_v = fault.wire.map(rail_v).or(fault.stuck_v);
+        (analog::tension_v(clean_n), shown_v.unwrap_or_else(|| analog::tension_v(shown_n)))
+    }
+
+    /// Volts of the current channel as they would be and as they are.
+    fn current_v(&mut self) -> (f64, f64) {
+        // The shunt is in the bridge's line to the motor: it sees the leads as the bridge does.
+        let sign = if self.motor_reversed { -1.0 } else { 1.0 };
+        let clean_a = sign * self.bench.sensed(Channel::Current);
+        let noise_a = self.current_fault.noise_a;
+        let noise_a = if noise_a > 0.0 { noise_a * self.normal() } else { 0.0 };
+        let fault = &self.current_fault;
+        let shown_a = clean_a * fault.gain + fault.offset_a + noise_a;
+        let shown_v = fault.wire.map(rail_v).or(fault.stuck_v);
+        (analog::current_v(clean_a), shown_v.unwrap_or_else(|| analog::current_v(shown_a)))
     }
 
     /// Applies `injection` (`on`) or takes it back; false if it does not concern the rig.
@@ -204,8 +358,37 @@ impl Rig {
                 self.tension_faults[one].plugged_in = on.then_some(other);
                 self.tension_faults[other].plugged_in = on.then_some(one);
             }
-            Injection::CurrentOffset(offset_a) => self.current_offset_a = if on { offset_a } else { 0.0 },
-            Injection::CurrentWire(rail) => self.current_wire = on.then_some(rail),
+            Injection::TensionNoise(at, noise_n) => {
+                self.tension_faults[tension_index(at)].noise_n = if on { noise_n } else { 0.0 };
+            }
+            Injection::TensionLate(at, delay_s) => {
+                let late = on.then(|| Late { delay_s, readings: VecDeque::new() });
+                self.tension_faults[tension_index(at)].late = late;
+            }
+            Injection::CurrentOffset(offset_a) => {
+                self.current_fault.offset_a = if on { offset_a } else { 0.0 };
+            }
+            Injection::CurrentWire(rail) => self.current_fault.wire = on.then_some(rail),
+            Injection::CurrentGain(gain) => self.current_fault.gain = if on { gain } else { 1.0 },
+            Injection::CurrentNoise(noise_a) => self.current_fault.noise_a = if on { noise_a } else { 0.0 },
+            Injection::CurrentStuck => {
+                let sign = if self.motor_reversed { -1.0 } else { 1.0 };
+                let volts = analog::current_v(sign * self.bench.current_a());
+                self.current_fault.stuck_v = on.then_some(volts);
+            }
+            Injection::BusReading(gain) => self.bus_reading = if on { gain } else { 1.0 },
+            Injection::MotorLead => self.motor_open = on,
+            Injection::JointTorque(torque_nm) => {
+                self.pushed = on;
+                self.bench.set_outer_torque_nm(if on { torque_nm } else { 0.0 });
+            }
+            Injection::EncoderSwapped => self.encoders_swapped = on,
+            Injection::EncoderLate(at, frames) => {
+                self.encoders[encoder_index(at)].set_late(if on { frames } else { 0 });
+            }
+            Injection::EncoderLost(at, probability) => {
+                self.encoders[encoder_index(at)].fault.lost = if on { probability } else { 0.0 };
+            }
             Injection::BusVoltage(bus_v) => {
                 self.bench.set_supply_v(if on { bus_v } else { self.nominal_supply_v });
             }
@@ -234,6 +417,7 @@ impl Rig {
             }
             Injection::EncoderBus(_)
             | Injection::BridgeFault
+            | Injection::LegLow(_)
             | Injection::EncoderDmaError(_)
             | Injection::ProcessorSupply
             | Injection::Crystal

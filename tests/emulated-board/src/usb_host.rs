@@ -139,6 +139,12 @@ pub(crate) struct UsbHost {
     out_toggle: bool,
     line_state: u16,
     line_state_due: bool,
+    /// Polls of a device that is there which an injection left out.
+    pub polls_left_out: u64,
+    /// Line states sent behind the enumeration.
+    pub line_states: u64,
+    /// Bytes that the device took.
+    pub bytes_taken: u64,
     /// Bytes for the device.
     pub outgoing: VecDeque<u8>,
     /// Bytes of the device.
@@ -179,6 +185,9 @@ impl UsbHost {
             out_toggle: false,
             line_state: 3,
             line_state_due: false,
+            polls_left_out: 0,
+            line_states: 0,
+            bytes_taken: 0,
             outgoing: VecDeque::new(),
             incoming: VecDeque::new(),
         }
@@ -225,6 +234,7 @@ impl UsbHost {
         self.next_s = now_s + self.poll_s;
         let mut moved = Moved::default();
         let rests = self.suspended || !self.plugged;
+        self.polls_left_out += u64::from(rests || self.silent || self.withheld);
         if rests && now_s - *self.idle_since_s.get_or_insert(now_s) >= IDLE_S {
             device.bus_idle();
         }
@@ -265,6 +275,7 @@ impl UsbHost {
                 if self.control.is_none() {
                     self.begin([0x21, 0x22], state, interface, 0, Vec::new(), now_s);
                     self.line_state_due = false;
+                    self.line_states += 1;
                 }
                 self.transact(device, now_s)?;
             }
@@ -497,6 +508,7 @@ impl UsbHost {
                 Handshake::Ack(()) => {
                     self.outgoing.drain(..packet.len());
                     self.out_toggle = !self.out_toggle;
+                    self.bytes_taken += packet.len() as u64;
                     moved.out = packet;
                 }
                 Handshake::Stall => return Err(format!("bulk endpoint {} stalls", self.bulk_out)),

@@ -52,9 +52,9 @@ pub struct Host {
 }
 
 impl Host {
-    /// Waits for the port of `board` and greets it.
-    pub fn connect(board: Board) -> Outcome<Self> {
-        let mut host = Self {
+    /// A host that has not said anything yet.
+    pub fn new(board: Board) -> Self {
+        Self {
             board,
             telemetry: Telemetry::default(),
             ticks: Ticks::default(),
@@ -67,7 +67,12 @@ impl Host {
             next_frame: None,
             spoken_s: 0.0,
             log: Vec::new(),
-        };
+        }
+    }
+
+    /// Waits for the port of `board` and greets it.
+    pub fn connect(board: Board) -> Outcome<Self> {
+        let mut host = Self::new(board);
         host.reconnect()?;
         Ok(host)
     }

@@ -7,6 +7,7 @@
     reason = "all of it fails with the board, its link or the image, in words"
 )]
 
+pub mod campaign;
 pub mod corrections;
 pub mod cost;
 pub mod course;

@@ -90,6 +90,8 @@ pub(crate) struct Rcc {
     hse_since_s: f64,
     /// The crystal oscillates when it is driven.
     crystal: bool,
+    /// Times that it stopped while it was used, or was switched on in vain.
+    losses: u64,
     /// Board time of the last switch of a fast system clock \[s\].
     switched_s: f64,
     /// Reset bits set by the last write, for the bus to act on.
@@ -135,6 +137,7 @@ impl Rcc {
             cifr: 0,
             hse_since_s: 0.0,
             crystal: true,
+            losses: 0,
             switched_s: f64::NEG_INFINITY,
             newly_reset: Vec::new(),
         }
@@ -143,7 +146,7 @@ impl Rcc {
     /// Registers behind a reset for `cause`; flags of earlier resets stay until they are cleared or power goes.
     pub(crate) fn reset(&mut self, cause: ResetCause) {
         let (csr, bdcr) = (self.csr, self.bdcr);
-        *self = Self { crystal: self.crystal, ..Self::new() };
+        *self = Self { crystal: self.crystal, losses: self.losses, ..Self::new() };
         if cause != ResetCause::PowerOn {
             self.csr = csr | cause.flags();
             self.bdcr = bdcr;
@@ -225,7 +228,13 @@ impl Rcc {
         }
         self.cr &= !(HSE_ON | SECURITY_ON);
         self.cifr |= SECURITY_FLAG;
+        self.losses += 1;
         Ok(true)
+    }
+
+    /// Times that the crystal stopped while it was used, or was switched on in vain.
+    pub(crate) fn losses(&self) -> u64 {
+        self.losses
     }
 
     /// Whether the security system asks for the NMI.
@@ -372,6 +381,7 @@ impl Rcc {
             return Err(Refusal::because("HSE is the system clock's source and cannot be switched off"));
         }
         if value & !self.cr & HSE_ON != 0 {
+            self.losses += u64::from(!self.crystal);
             self.hse_since_s = now_s;
         }
         if value & !self.cr & PLL_ON != 0 {
