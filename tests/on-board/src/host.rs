@@ -202,6 +202,11 @@ impl Host {
         self.answers.remove(at).map(|(_, message)| message)
     }
 
+    /// Drops the answers that nobody waits for.
+    pub fn forget_answers(&mut self) {
+        self.answers.clear();
+    }
+
     /// Sends a request and waits for its answer.
     pub fn ask(&mut self, message: &ToBoard) -> Outcome<FromBoard> {
         let number = self.send(message.clone())?;

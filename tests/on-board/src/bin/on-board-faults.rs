@@ -111,7 +111,7 @@ fn campaign(options: &Options) -> Outcome {
         if limit.is_some_and(|limit| begun.elapsed() > limit) {
             return None;
         }
-        let judged = match run(&elf, &flash, case) {
+        let judged = match run(&elf, &flash, case, &healthy) {
             Ok(run) => judge(case, &run, &healthy),
             Err(Failure(reason)) => Judged::broken(case, &reason),
         };

@@ -108,11 +108,29 @@ impl Healthy {
     }
 
     /// Largest error of the true angle from board time `since_s` on against the reference of the healthy run of the same phase and
-    /// seed \[rad\].
+    /// seed \[rad\]; infinite if the joint was driven where the healthy one was not.
     pub fn largest_error_rad(&self, phase: Phase, seed: u64, run: &Run, since_s: f64) -> f64 {
         let Some(legs) = self.references.get(&(phase, seed)) else { return f64::INFINITY };
-        let looks = run.looks.iter().filter(|look| look.at_s >= since_s);
-        looks.filter_map(|look| Some((look.angle_rad - legs.at(look)?).abs())).fold(0.0, f64::max)
+        let (mut largest_rad, mut compared, mut driven) = (0.0_f64, 0, 0);
+        for look in run.looks.iter().filter(|look| look.at_s >= since_s) {
+            driven += 1;
+            if let Some(reference_rad) = legs.at(look) {
+                largest_rad = largest_rad.max((look.angle_rad - reference_rad).abs());
+                compared += 1;
+            }
+        }
+        if 2 * compared < driven { f64::INFINITY } else { largest_rad }
+    }
+
+    /// The same while the run goes on, by its looks so far: whether it is off its reference.
+    pub fn is_off(&self, phase: Phase, seed: u64, looks: &[Look], since_s: f64) -> bool {
+        let Some(legs) = self.references.get(&(phase, seed)) else { return false };
+        let bound_rad = self.envelope(phase).bounds().error_rad;
+        let mut errors = looks
+            .iter()
+            .filter(|look| look.at_s >= since_s)
+            .filter_map(|look| Some((look.angle_rad - legs.at(look)?).abs()));
+        errors.any(|error_rad| error_rad > bound_rad)
     }
 }
 
@@ -120,8 +138,9 @@ impl Healthy {
 const fn latest_s(phase: Phase) -> f64 {
     match phase {
         Phase::Start | Phase::SelfTest | Phase::Homing => 0.0,
-        Phase::Hold | Phase::Slow => 2.2,
-        Phase::Fast | Phase::Reversal => 1.8,
+        Phase::Hold => 2.1,
+        Phase::Slow | Phase::Reversal => 1.0,
+        Phase::Fast => 1.5,
     }
 }
 

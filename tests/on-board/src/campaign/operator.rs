@@ -156,6 +156,7 @@ impl Operator {
 
     /// Asks for the state; `None` without an answer in time, or if the board stops meanwhile.
     fn state(&mut self) -> Outcome<Option<State>> {
+        self.host.forget_answers();
         let number = self.host.send(ToBoard::ReadStatus)?;
         let end_s = self.now_s() + ANSWER_S;
         while self.now_s() < end_s {

@@ -170,8 +170,8 @@ pub fn page(cases: &[Judged], healthy: &Healthy, asked: usize, provenance: &str)
          `cargo xtask faults` wrote this page: {provenance}.{part}\n\n\
          {}\n\n\
          Each case is a fresh emulated board with the release image and the virtual bench. The joint is brought into a phase, one or two\n\
-         faults begin at a drawn moment, and the true joint is watched while it is driven on, and for 0.3 s behind a stop. All of a case\n\
-         follows from its name: `cargo xtask faults --only tension-stuck/fast/1001` runs it alone.\n\n\
+         faults begin at a drawn moment, and the true joint is watched while it is driven on for about 1 s (3 s more where it is off\n\
+         its reference), and for 0.2 s behind a stop. All of a case follows from its name: `cargo xtask faults --only tension-stuck/fast/1001` runs it alone.\n\n\
          ## Result\n\n\
          n: named, h: harmless, **S**: silently wrong, **U**: without proof. *Named as* lists fault numbers of the board with their\n\
          counts; a reset is named by its cause instead. *Motor off after* counts from the fault, *behind detection* from the beginning of\n\

@@ -13,11 +13,11 @@ pub enum Phase {
     Start,
     /// The self test and the pretension check run.
     SelfTest,
-    /// The joint is on its way from 0.3 rad to zero.
+    /// The joint is on its way from 0.2 rad to zero.
     Homing,
     /// The joint stands on a stair for 0.75 s, then takes the next one, 0.1 rad away.
     Hold,
-    /// A sine of 0.3 rad at 0.1 Hz.
+    /// A triangle of 0.3 rad at 0.125 Hz: 0.15 rad/s.
     Slow,
     /// A sine of 0.3 rad at 1 Hz.
     Fast,
@@ -53,7 +53,7 @@ impl Phase {
         let (shape, amplitude, frequency_hz) = match self {
             // A stair of 0.1 rad every second, taken in a quarter of it.
             Self::Hold => (Shape::Staircase, 0.4, 0.0625),
-            Self::Slow => (Shape::Sine, 0.3, 0.1),
+            Self::Slow => (Shape::Triangle, 0.3, 0.125),
             Self::Start | Self::SelfTest | Self::Homing | Self::Fast | Self::Reversal => {
                 (Shape::Sine, 0.3, 1.0)
             }
@@ -67,26 +67,27 @@ impl Phase {
             // Up to the greeting, or to the state ready.
             Self::Start => draw.uniform(0.0, 0.05),
             Self::SelfTest => draw.uniform(0.0, 0.2),
-            // 0.3 rad take 0.8 s.
-            Self::Homing => draw.uniform(0.02, 0.6),
+            // 0.2 rad take 0.5 s.
+            Self::Homing => draw.uniform(0.02, 0.4),
             // Standing on the second stair, behind the ramp of 0.5 s.
             Self::Hold => draw.uniform(1.3, 1.9),
             // Behind the ramp.
-            Self::Slow => draw.uniform(0.6, 2.0),
-            Self::Fast => draw.uniform(0.6, 1.6),
-            // Turning points of the sine are at 0.75 s and 1.25 s.
-            Self::Reversal => 0.75 + 0.5 * draw.index(2) as f64 + draw.uniform(-0.01, 0.01),
+            Self::Slow => draw.uniform(0.55, 0.8),
+            Self::Fast => draw.uniform(0.55, 1.3),
+            // The first turning point of the sine behind the ramp is at 0.75 s.
+            Self::Reversal => 0.75 + draw.uniform(-0.01, 0.01),
         }
     }
 
     /// Time that is driven behind the fault, or behind the end of the phase \[s\].
     pub const fn window_s(self) -> f64 {
         match self {
-            Self::Start | Self::SelfTest | Self::Fast | Self::Reversal => 1.3,
-            Self::Homing => 1.0,
-            Self::Hold => 1.6,
-            // 0.15 rad, which tell an encoder that stands, take 1.2 s or more.
-            Self::Slow => 2.5,
+            // A host that is silent is found after 0.5 s.
+            Self::Start | Self::SelfTest | Self::Fast | Self::Reversal => 0.9,
+            Self::Homing => 0.7,
+            Self::Hold => 1.2,
+            // 0.15 rad, which tell an encoder that stands, take 1 s.
+            Self::Slow => 1.3,
         }
     }
 }

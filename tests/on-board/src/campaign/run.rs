@@ -5,6 +5,7 @@ use bowden_link::message::{Boot, Goal, Reference};
 use bowden_link::{FaultRecord, State, ToBoard};
 
 use super::case::Case;
+use super::healthy::Healthy;
 use super::operator::{Look, Operator, Reached};
 use super::phase::Phase;
 use super::trouble::Act;
@@ -12,11 +13,13 @@ use crate::host::Host;
 use crate::{Failure, Outcome, fail};
 
 /// Time that the joint is watched behind a stop, nobody ordering anything \[s\].
-const AFTER_S: f64 = 0.3;
-/// Time in which homing has to end, set on the board: 0.3 rad take 0.8 s \[s\].
+const AFTER_S: f64 = 0.2;
+/// Time in which homing has to end, set on the board: 0.2 rad take 0.5 s \[s\].
 const HOMING_TIMEOUT_S: f32 = 2.5;
+/// Time for which a joint that is off its reference is driven on, for the board to find it \[s\].
+const LONGER_S: f64 = 3.0;
 /// Angle that homing comes back from \[rad\].
-const AWAY_RAD: f32 = 0.3;
+const AWAY_RAD: f32 = 0.2;
 
 /// What a run showed.
 #[derive(Debug, Clone)]
@@ -60,30 +63,31 @@ pub fn stored(elf: &[u8]) -> Outcome<Vec<u8>> {
 
 /// Runs the phase without a fault.
 pub fn healthy(elf: &[u8], flash: &[u8], phase: Phase, bench_seed: u64, instant_s: f64) -> Outcome<Run> {
-    whole(elf, flash, phase, bench_seed, None, instant_s)
+    let mut operator = operator(elf, flash, bench_seed)?;
+    operator.host.board.take_peaks();
+    session(&mut operator, phase, None, instant_s)?;
+    ended(operator, None)
 }
 
-/// Runs `case`.
-pub fn run(elf: &[u8], flash: &[u8], case: &Case) -> Outcome<Run> {
-    whole(elf, flash, case.phase, case.bench_seed, Some(case), case.instant_s)
+/// Runs `case`; a joint that is off the reference of the healthy runs is driven on, for the board to find it.
+pub fn run(elf: &[u8], flash: &[u8], case: &Case, healthy: &Healthy) -> Outcome<Run> {
+    let mut operator = operator(elf, flash, case.bench_seed)?;
+    session(&mut operator, case.phase, Some(case), case.instant_s)?;
+    if let Some(began_s) = operator.began_s
+        && operator.host.board.pwm().duty.is_some()
+        && healthy.is_off(case.phase, case.bench_seed, &operator.looks, began_s)
+    {
+        let looks = operator.looks.len();
+        operator.drive(LONGER_S)?;
+        operator.looks.truncate(looks);
+    }
+    ended(operator, Some(case))
 }
 
-fn whole(
-    elf: &[u8],
-    flash: &[u8],
-    phase: Phase,
-    bench_seed: u64,
-    case: Option<&Case>,
-    instant_s: f64,
-) -> Outcome<Run> {
+fn operator(elf: &[u8], flash: &[u8], bench_seed: u64) -> Outcome<Operator> {
     let mut board = Board::builder(elf).seed(bench_seed).flash_image(flash).build()?;
     board.deliver_faults(true);
-    let mut operator = Operator::new(Host::new(board));
-    if case.is_none() {
-        operator.host.board.take_peaks();
-    }
-    session(&mut operator, phase, case, instant_s)?;
-    ended(operator, case)
+    Ok(Operator::new(Host::new(board)))
 }
 
 /// Lets the faults of `case` come `instant_s` from now.
@@ -162,9 +166,9 @@ fn greeted(operator: &mut Operator) -> Outcome<bool> {
 /// Brings the joint away from zero and to ready again.
 fn away(operator: &mut Operator) -> Outcome {
     let reached = operator.follow(Reference::Hold(AWAY_RAD))?;
-    operator.drive(0.9)?;
+    operator.drive(0.6)?;
     operator.order(ToBoard::Enter(Goal::Off))?;
-    operator.drive(0.2)?;
+    operator.drive(0.1)?;
     if reached != Reached::State || operator.make_ready()? != Reached::State {
         return fail("the joint did not come away from zero");
     }

@@ -219,7 +219,9 @@ impl Underway {
     fn flood_frame(&mut self) -> Vec<u8> {
         self.number = self.number.wrapping_add(1);
         let mut buffer = [0; FRAME_LENGTH];
-        let request = Request { sequence: self.number, message: ToBoard::ReadStatus };
+        // Apart from the numbers of the operator's own requests.
+        let sequence = self.number | 0x8000;
+        let request = Request { sequence, message: ToBoard::ReadStatus };
         let mut frame = encode(&request, &mut buffer).map_or_else(|_| Vec::new(), |frame| frame.to_vec());
         if let (Act::Rubbish, Some(byte)) = (self.trouble.act, frame.get_mut(1)) {
             *byte ^= 0x55;
