@@ -13,8 +13,8 @@ use crate::host::Host;
 pub const LOOK_S: f64 = 1e-3;
 /// Time between two signs of life \[s\]; the board waits for 0.5 s.
 const ALIVE_S: f64 = 0.1;
-/// Time in which the state is told \[s\].
-const ANSWER_S: f64 = 0.1;
+/// Time in which the state is told: a flood of other requests waits before it \[s\].
+const ANSWER_S: f64 = 0.5;
 /// Time between two questions for the state \[s\].
 const ASKED_S: f64 = 5e-3;
 
@@ -202,7 +202,7 @@ impl Operator {
     pub fn follow(&mut self, reference: Reference) -> Outcome<Reached> {
         self.order(ToBoard::SetReference(reference))?;
         self.order(ToBoard::Enter(Goal::Run(Mode::Position)))?;
-        self.reach(State::Run, 0.1)
+        self.reach(State::Run, ANSWER_S)
     }
 
     /// From off to ready.
@@ -215,7 +215,7 @@ impl Operator {
     /// From ready to zero, where the bridge opens.
     pub fn home(&mut self) -> Outcome<Reached> {
         self.order(ToBoard::Enter(Goal::Home))?;
-        let reached = self.reach(State::Homing, 0.1)?;
+        let reached = self.reach(State::Homing, ANSWER_S)?;
         if reached != Reached::State {
             return Ok(reached);
         }
@@ -229,7 +229,7 @@ impl Operator {
         let (boots, openings) = self.before;
         // Asked for as of an opening that was expected.
         self.before.1 = self.host.board.bridge_events().openings;
-        let reached = self.reach(State::Ready, 0.1)?;
+        let reached = self.reach(State::Ready, ANSWER_S)?;
         if reached != Reached::State {
             self.before = (boots, openings);
         }
