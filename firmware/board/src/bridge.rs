@@ -180,8 +180,13 @@ pub fn set_rate_divider(divider: u16) {
     pac::TIM1.rcr().write(|counter| counter.set_rep(2 * divider.max(1) - 1));
 }
 
-/// Outputs off, from any context, with nothing but two writes.
+/// Outputs off, from any context, with nothing but two writes. Before timer and port have their clocks nothing of the bridge is on, and
+/// their registers must not be touched (RM0440, 7.2.17).
 pub fn off() {
-    pac::TIM1.bdtr().modify(|break_register| break_register.set_moe(false));
-    pac::GPIOC.bsrr().write(|pins| pins.set_br(6, true));
+    if pac::RCC.apb2enr().read().tim1en() {
+        pac::TIM1.bdtr().modify(|break_register| break_register.set_moe(false));
+    }
+    if pac::RCC.ahb2enr().read().gpiocen() {
+        pac::GPIOC.bsrr().write(|pins| pins.set_br(6, true));
+    }
 }

@@ -8,6 +8,7 @@ mod core_from_source;
 mod cross_target;
 mod debian;
 mod demo;
+mod faults;
 mod files;
 mod firmware;
 mod fuzz;
@@ -52,6 +53,9 @@ enum Task {
     Paper(paper::Options),
     /// Run the fuzz targets under libFuzzer; `fuzz --help` lists options
     Fuzz(fuzz::Options),
+    /// Break one or two things at a time on the emulated board, judge what the release image makes of it, and write
+    /// tests/docs/faults.md; `faults --help` lists options
+    Faults(faults::Options),
     /// Build the release images for the driver board and print what they take of its memory
     Firmware,
     /// Run clippy on everything, the board's images among it; warnings are errors
@@ -66,6 +70,7 @@ fn main() -> ExitCode {
         Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
         Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),
         Ok(Cli { task: Task::Fuzz(options) }) => fuzz::run(&options),
+        Ok(Cli { task: Task::Faults(options) }) => faults::run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
         Ok(Cli { task: Task::Clippy }) => clippy::run(),
         Err(error) => return usage(&error),
@@ -96,6 +101,7 @@ fn usage(error: &clap::Error) -> ExitCode {
     let what = what.join(" ");
     eprintln!(
         "xtask: {}; the tasks are demo, test, bench, prove, paper, fuzz, firmware and clippy, see `cargo xtask --help`",
+        "xtask: {}; the tasks are demo, test, bench, prove, paper, faults, firmware and clippy, see `cargo xtask --help`",
         what.strip_prefix("error: ").unwrap_or(&what)
     );
     ExitCode::from(2)

@@ -99,6 +99,8 @@ pub(crate) struct Bus {
     legs_low: [bool; 2],
     /// The processor's supply is below the levels of its voltage detector.
     supply_low: bool,
+    /// The voltage detector says so.
+    supply_found: bool,
     /// A reset that a peripheral asks for.
     pub reset_request: Option<ResetCause>,
     /// What ends the run.
@@ -144,6 +146,7 @@ impl Bus {
             withheld_requests: [Cell::new(0), Cell::new(0)],
             legs_low: [false; 2],
             supply_low: false,
+            supply_found: false,
             reset_request: None,
             failure: None,
             accesses: 0,
@@ -182,6 +185,7 @@ impl Bus {
         self.flash.reset();
         self.watchdog = Watchdog::new();
         self.reset_request = None;
+        self.supply_changed(now);
         for encoder in self.rig.encoders.iter_mut().filter(|encoder| encoder.selected()) {
             // A reset lets go of chip select at any moment: a cut frame, no misuse of the part.
             let _ = encoder.deselect(now_s);
@@ -449,13 +453,17 @@ impl Bus {
 
     /// The processor's supply falls below the levels of its voltage detector, or is back.
     pub(crate) fn set_supply_low(&mut self, low: bool, now: u64) {
-        let fell = low && !self.supply_low && self.pwr.detects_supply();
-        self.rig.altered.supply_dips += u64::from(fell);
         self.supply_low = low;
-        if low && self.pwr.detects_supply() && self.syscfg.breaks_by_supply() {
-            self.tim1.system_break();
-            self.tim1_changed(now);
-        }
+        self.supply_changed(now);
+    }
+
+    /// Follows the voltage detector: its output breaks TIM1 as long as it is high (RM0440, TIM1 break function).
+    fn supply_changed(&mut self, now: u64) {
+        let found = self.supply_low && self.pwr.detects_supply();
+        self.rig.altered.supply_dips += u64::from(found && !self.supply_found);
+        self.supply_found = found;
+        self.tim1.set_system_break(found && self.syscfg.breaks_by_supply());
+        self.tim1_changed(now);
     }
 
     fn break_by_flash(&mut self, now: u64) {

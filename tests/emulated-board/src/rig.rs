@@ -513,7 +513,9 @@ mod tests {
             (Injection::TensionGain(TensionAt::F2, 2.0), f2, 1.88),
             (Injection::CurrentOffset(-5.0), Input::Current, 1.05),
             (Injection::CurrentWire(Rail::Low), Input::Current, 0.02),
+            (Injection::CurrentStuck, Input::Current, 1.65),
             (Injection::BusVoltage(11.0), Input::Bus, 1.0),
+            (Injection::BusReading(1.1), Input::Bus, 2.4),
         ] {
             let before = volts(&mut rig, input);
             assert!(rig.inject(injection, true, 0.0));
@@ -537,5 +539,119 @@ mod tests {
         let tight = rig.volts(Input::Tension(3), 0.3);
         rig.inject(Injection::Pretension(Cable::B, 0.2), true, 0.3);
         assert!(rig.volts(Input::Tension(3), 0.5) < tight - 0.1);
+    }
+
+    #[test]
+    fn only_conversions_with_another_code_count_as_altered() {
+        let mut rig = rig();
+        for input in [Input::Tension(2), Input::Current, Input::Bus] {
+            rig.volts(input, 0.0);
+        }
+        // 1.0 A · 0.12 V/A are 149 codes; nothing flows, so that a gain changes nothing; 0.01 N are a quarter of a code.
+        for injection in [
+            Injection::CurrentGain(3.0),
+            Injection::TensionOffset(TensionAt::F3, 0.01),
+            Injection::TensionLate(TensionAt::F3, 0.01),
+        ] {
+            rig.inject(injection, true, 0.0);
+        }
+        rig.volts(Input::Tension(2), 0.0);
+        rig.volts(Input::Current, 0.0);
+        assert_eq!(rig.altered, Altered::default());
+        rig.inject(Injection::CurrentOffset(1.0), true, 0.0);
+        rig.inject(Injection::TensionOffset(TensionAt::F3, 1.0), true, 0.0);
+        rig.inject(Injection::BusReading(0.9), true, 0.0);
+        for input in [Input::Tension(2), Input::Tension(2), Input::Tension(1), Input::Current, Input::Bus] {
+            rig.volts(input, 0.1);
+        }
+        // The late reading stands at the one before the offset.
+        assert_eq!(rig.altered.conversions, [0, 0, 0, 0, 1, 1]);
+        rig.volts(Input::Tension(2), 0.2);
+        assert_eq!(rig.altered.conversions, [0, 0, 1, 0, 1, 1]);
+    }
+
+    #[test]
+    fn noise_has_its_standard_deviation_and_a_late_reading_its_delay() {
+        let mut rig = rig();
+        rig.inject(Injection::TensionNoise(TensionAt::F1, 2.0), true, 0.0);
+        rig.inject(Injection::CurrentNoise(0.5), true, 0.0);
+        let spread = |rig: &mut Rig, input: Input, mean_v: f64| {
+            let squares: f64 = (0..2000).map(|_| (rig.volts(input, 0.0) - mean_v).powi(2)).sum();
+            (squares / 2000.0).sqrt()
+        };
+        // Of 2000 values the deviation is known to 1.6 %.
+        let (tension_v, current_v) =
+            (spread(&mut rig, Input::Tension(0), 1.19), spread(&mut rig, Input::Current, 1.65));
+        assert!((tension_v / (2.0 * 0.023) - 1.0).abs() < 0.07, "{tension_v}");
+        assert!((current_v / (0.5 * 0.12) - 1.0).abs() < 0.07, "{current_v}");
+        rig.inject(Injection::TensionNoise(TensionAt::F1, 0.0), false, 0.0);
+        rig.inject(Injection::TensionLate(TensionAt::F1, 0.0195), true, 0.0);
+        rig.set_bridge(0.0, Bridge::Duty(0.2));
+        let mut prompt = Vec::new();
+        for k in 0..100 {
+            let at_s = 1e-3 * f64::from(k);
+            let late_v = rig.volts(Input::Tension(0), at_s);
+            prompt.push(analog::tension_v(rig.bench().tensions_n()[0]));
+            let then: usize = if k < 20 { 0 } else { k as usize - 20 };
+            assert!((late_v - prompt[then]).abs() < 1e-9, "{k}");
+        }
+        assert!(prompt[99] > prompt[0] + 0.1, "it moves");
+    }
+
+    #[test]
+    fn an_open_lead_carries_no_current_and_a_push_and_a_loose_cable_count_in_steps_of_the_bench() {
+        let mut rig = rig();
+        rig.set_bridge(0.0, Bridge::Duty(0.2));
+        rig.advance(0.01);
+        assert!(rig.bench().current_a() > 0.1);
+        assert_eq!(rig.altered, Altered::default());
+        rig.inject(Injection::MotorLead, true, 0.01);
+        rig.advance(0.02);
+        assert_eq!(
+            (rig.bench().current_a(), rig.bridge()),
+            (0.0, Bridge::Duty(0.2)),
+            "the bridge does not notice"
+        );
+        rig.inject(Injection::JointTorque(1.0), true, 0.02);
+        rig.inject(Injection::Pretension(Cable::A, 0.5), true, 0.02);
+        rig.advance(0.03);
+        let altered = rig.altered;
+        for (steps, expected) in
+            [(altered.motor_steps, 2000), (altered.joint_steps, 1000), (altered.cable_steps, 1000)]
+        {
+            assert!(steps.abs_diff(expected) <= 2, "{altered:?}");
+        }
+        assert!(rig.bench().omega_out_rad_per_s() > 0.0, "it is pushed towards +θ");
+    }
+
+    #[test]
+    fn swapped_encoders_show_each_other_s_counts() {
+        let mut rig = rig();
+        rig.inject(Injection::EncoderSwapped, true, 0.0);
+        for index in 0..2 {
+            rig.select_encoder(index, 0.0);
+        }
+        assert_eq!(rig.altered.frames, [1, 1], "1000 and 2000 counts");
+        rig.inject(Injection::EncoderSwapped, false, 0.0);
+        rig.select_encoder(0, 0.0);
+        assert_eq!(rig.altered.frames, [1, 1]);
+    }
+
+    #[test]
+    fn peaks_are_those_since_the_last_look_and_openings_have_their_time() {
+        let mut rig = rig();
+        rig.set_bridge(0.01, Bridge::Duty(0.3));
+        rig.set_bridge(0.1, Bridge::Open);
+        rig.advance(0.1);
+        let peaks = rig.take_peaks();
+        let now = rig.bench();
+        assert!(
+            peaks.tensions_n[0] > 30.0
+                && peaks.current_a > 0.5
+                && peaks.angle_rad >= now.theta_out_rad().abs()
+        );
+        assert_eq!(rig.take_peaks(), Peaks::default());
+        let BridgeEvents { openings, closings, opened_s, closed_s } = rig.bridge_events();
+        assert_eq!((openings, closings, opened_s, closed_s), (1, 1, 0.1, 0.01));
     }
 }

@@ -179,9 +179,14 @@ impl Bus {
             Unit::PacketMemory => Err(Refusal::no_register(offset)),
             Unit::Pwr => {
                 self.pwr.write(offset, value)?;
+                self.supply_changed(now);
                 self.check_clock(now)
             }
-            Unit::Syscfg => self.syscfg.write(offset, value),
+            Unit::Syscfg => {
+                self.syscfg.write(offset, value)?;
+                self.supply_changed(now);
+                Ok(())
+            }
             Unit::Exti => self.exti.write(offset, value),
             Unit::Tim1 => {
                 if matches!(offset, 0x34 | 0x38 | 0x3c | 0x40) {

@@ -81,6 +81,8 @@ pub(crate) struct AdvancedTimer {
     lock_is_set: bool,
     /// Level at the BKIN pin.
     break_pin: bool,
+    /// A system break that lasts: the processor's supply.
+    system_break: bool,
     /// Level behind the break filter: active.
     break_seen: bool,
     /// Cycle at which the filter passes the pin's level on, if that is another one.
@@ -121,6 +123,7 @@ impl AdvancedTimer {
             af1: 1,
             lock_is_set: false,
             break_pin: true,
+            system_break: false,
             break_seen: false,
             break_change: NEVER,
             frozen_since: None,
@@ -134,7 +137,12 @@ impl AdvancedTimer {
 
     /// Back to the reset state; the level at BKIN stays.
     pub(crate) fn reset(&mut self) {
-        *self = Self { break_pin: self.break_pin, frozen_since: self.frozen_since, ..Self::new() };
+        *self = Self {
+            break_pin: self.break_pin,
+            system_break: self.system_break,
+            frozen_since: self.frozen_since,
+            ..Self::new()
+        };
     }
 
     fn runs(&self) -> bool {
@@ -274,6 +282,15 @@ impl AdvancedTimer {
             self.bdtr &= !MAIN_OUTPUT_ENABLE;
             self.sr |= BREAK_FLAG;
         }
+        if self.system_break {
+            self.system_break();
+        }
+    }
+
+    /// A system break begins that lasts until it is taken back, or is taken back.
+    pub(crate) fn set_system_break(&mut self, active: bool) {
+        self.system_break = active;
+        self.apply_break();
     }
 
     /// A system break: failure of the clock, lockup and their like (RM0440, TIM1 break function).
@@ -679,6 +696,20 @@ mod tests {
         assert_eq!(timer.leg(0), Leg::Off, "OSSR 1");
         timer.write(0x20, 0x50, 1005).expect("CCER without CC1E and CC1NE");
         assert_eq!(timer.leg(0), Leg::Floating);
+    }
+
+    #[test]
+    fn a_system_break_that_lasts_brings_its_flag_back_and_keeps_the_output_off() {
+        let mut timer = driving();
+        timer.set_system_break(true);
+        assert!(!timer.main_output());
+        timer.write(0x10, 0, 101).expect("SR");
+        timer.write(0x44, 0x0000_9022, 102).expect("BDTR MOE");
+        assert!(timer.sr & SYSTEM_BREAK_FLAG != 0 && !timer.main_output());
+        timer.set_system_break(false);
+        timer.write(0x10, 0, 103).expect("SR");
+        timer.write(0x44, 0x0000_9022, 104).expect("BDTR MOE");
+        assert!(timer.sr & SYSTEM_BREAK_FLAG == 0 && timer.main_output());
     }
 
     #[test]

@@ -124,7 +124,8 @@ fn campaign(options: &Options) -> Outcome {
     println!("\n{}\n\n{}\n\n{}", page::table(&judged), page::sums(&judged), page::wrong(&judged));
     println!("{:.1} s for {} cases", begun.elapsed().as_secs_f64(), judged.len());
     if let (Some(path), None) = (&options.page, &options.only) {
-        write(path, &page::page(&judged, &healthy, cases.len(), &options.provenance))?;
+        let found = page::written_by_hand(&std::fs::read_to_string(path).unwrap_or_default());
+        write(path, &page::page(&judged, &healthy, cases.len(), &options.provenance, &found))?;
         println!("{}", path.display());
     }
     Ok(())

@@ -158,42 +158,61 @@ fn kinds() -> String {
     format!("| subject | name | what it is |\n|---|---|---|\n{}", rows.join("\n"))
 }
 
-/// The page.
-pub fn page(cases: &[Judged], healthy: &Healthy, asked: usize, provenance: &str) -> String {
+/// Heading of the part of the page that people write; a campaign keeps it.
+const FOUND: &str = "## What was found";
+
+/// The part of a page that people wrote, from its heading to the next one; the bare heading if there is none.
+pub fn written_by_hand(page: &str) -> String {
+    let Some((_, behind)) = page.split_once(FOUND) else { return format!("{FOUND}\n") };
+    let text = behind.split("\n## ").next().unwrap_or_default();
+    format!("{FOUND}{}\n", text.trim_end())
+}
+
+/// What the words of the table mean.
+fn words() -> String {
+    format!(
+        "- **Named** (n): the board has a fault record, or says what started it anew. *Named as* lists the numbers of the faults with\n  \
+           their counts.\n\
+         - **Harmless** (h): no stop, and from the fault to the end nothing beyond {FACTOR} times the largest value of three healthy runs of\n  \
+           the same phase, plus one encoder count for the angle, and never beyond a limit of the board; or a fault of the link by which\n  \
+           no order reaches the board, so that the motor stays off. The error is that of the bench's true angle against the reference\n  \
+           of the healthy run with the same noise.\n\
+         - **Silently wrong** (**S**): neither, 3 s later too.\n\
+         - **Without proof** (**U**): the emulated chip counted nothing that the fault altered: no conversion, frame, request of DMA,\n  \
+           transaction, step of the bench or reset. It counts at each place; of two faults both have to be there.\n\
+         - **Violation**: motor off more than one tick (100 us) behind the beginning of the tick in the record, a true tension more than\n  \
+           {:.0} % over the {TENSION_LIMIT_N} N of `tension.over`, or the bridge closed again without an order.\n\
+         - *Motor off after* counts from the fault, *behind detection* from the beginning of the control tick in the record (0 where\n  \
+           hardware was faster); both are the worst of the row, and so are tension and angle, up to 0.2 s behind the stop.",
+        100.0 * TENSION_EXCESS
+    )
+}
+
+/// The page; `found` is the part that people write.
+pub fn page(cases: &[Judged], healthy: &Healthy, asked: usize, provenance: &str, found: &str) -> String {
     let part = if cases.len() < asked {
-        format!(" The campaign asked for {asked} cases; {} ran.", cases.len())
+        format!(" The campaign asked for {asked} cases; {} ran in the time that it had.", cases.len())
     } else {
         String::new()
     };
     format!(
         "# Faults on the emulated board\n\n\
-         `cargo xtask faults` wrote this page: {provenance}.{part}\n\n\
+         `cargo xtask faults` breaks one or two things at a time on the emulated board and judges what the release image makes of it; it\n\
+         wrote this page, but for the next section: {provenance}.{part}\n\n\
          {}\n\n\
-         Each case is a fresh emulated board with the release image and the virtual bench. The joint is brought into a phase, one or two\n\
-         faults begin at a drawn moment, and the true joint is watched while it is driven on for about 1 s (3 s more where it is off\n\
-         its reference), and for 0.2 s behind a stop. All of a case follows from its name: `cargo xtask faults --only tension-stuck/fast/1001` runs it alone.\n\n\
-         ## Result\n\n\
-         n: named, h: harmless, **S**: silently wrong, **U**: without proof. *Named as* lists fault numbers of the board with their\n\
-         counts; a reset is named by its cause instead. *Motor off after* counts from the fault, *behind detection* from the beginning of\n\
-         the control tick in the fault record; both are the worst of the row.\n\n{}\n\n\
+         Each case is a fresh board with the virtual bench. The joint is brought into a phase, the faults begin at a drawn moment, and\n\
+         the true joint is watched while it is driven on for about 1 s (3 s more where it is off its reference), and for 0.2 s behind a\n\
+         stop. All of a case follows from its name: `cargo xtask faults --only tension-stuck/fast/1001` runs it alone.\n\n\
+         {found}\n\
+         ## Result\n\n{}\n\n{}\n\n\
          ## Neither named nor harmless, or with a violation\n\n{}\n\n\
-         ## What the words mean\n\n\
-         - **Named**: the board has a fault record, or says what started it anew.\n\
-         - **Harmless**: no stop, and from the fault to the end nothing beyond {FACTOR} times the largest value of three healthy runs of the\n  \
-           same phase (plus one encoder count for the angle, and never beyond the limits of the board); or a fault of the link that leaves the\n  \
-           motor off because no order arrives. The error is that of the bench's true angle against the reference of the healthy run.\n\
-         - **Silently wrong**: neither.\n\
-         - **Without proof**: the emulated chip counted no altered conversion, frame, transaction, step or reset. Counts are per place; a case\n  \
-           with two faults needs both.\n\
-         - **Violation**: motor off more than one tick (100 us) behind the beginning of the tick in the record, a true tension more than {:.0} %\n  \
-           over the {TENSION_LIMIT_N} N of `tension.over`, or the bridge closed again without an order.\n\n\
          ## Healthy runs\n\n{}\n\n\
          `supervisor.homing_timeout` is 2.5 s in the campaign; all other parameters are the defaults.\n\n\
          ## Faults\n\n{}\n",
         sums(cases),
         table(cases),
+        words(),
         wrong(cases),
-        100.0 * TENSION_EXCESS,
         envelopes(healthy),
         kinds(),
     )
@@ -222,6 +241,15 @@ mod tests {
         assert!(sums(&cases).starts_with("4 cases: 1 named, 1 harmless, 1 silently wrong, 1 without proof"));
         assert_eq!(wrong(&cases).lines().count(), 2);
         assert_eq!(wrong(&cases[..2]), "None.");
+    }
+
+    #[test]
+    fn what_people_wrote_is_kept() {
+        let found = "## What was found\n\n- A gap.\n";
+        let page = page(&[], &Healthy::default(), 3, "now", found);
+        assert!(page.contains("asked for 3 cases; 0 ran"));
+        assert_eq!(written_by_hand(&page), found);
+        assert_eq!(written_by_hand("# Faults\n"), "## What was found\n");
     }
 
     #[test]

@@ -71,6 +71,21 @@ fn damaged_code_opens_the_bridge_and_is_a_named_fault() -> Outcome {
     Ok(())
 }
 
+/// From the first instructions on, before the bridge's timer has its clock; behind the start the board says why.
+#[test]
+fn damaged_code_at_any_moment_of_the_start_is_a_named_fault() -> Outcome {
+    let elf = image::firmware()?;
+    for after_s in [0.1e-3, 1e-3, 4e-3, 8e-3, 16e-3, 30e-3] {
+        let mut board = Board::builder(&elf).build()?;
+        board.run_for(after_s)?;
+        board.inject(Injection::FlashDamage);
+        let mut host = Host::connect(board)?;
+        let fault = host.status()?.fault.map(|record| record.fault);
+        assert_eq!((host.board.counters().boots, fault), (2, Some(Fault::FlashDamaged)), "{after_s} s");
+    }
+    Ok(())
+}
+
 #[test]
 fn a_flash_of_one_bank_is_told_and_nothing_is_stored() -> Outcome {
     let board = Board::builder(&image::firmware()?).option_bytes(false, 0).build()?;

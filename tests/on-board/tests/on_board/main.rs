@@ -4,6 +4,7 @@ mod boot;
 mod boot_loader;
 mod bridge;
 mod calibrate;
+mod campaign;
 mod clock;
 mod closed_loop;
 mod conformance;
