@@ -18,6 +18,8 @@ const AFTER_S: f64 = 0.2;
 const HOMING_TIMEOUT_S: f32 = 2.5;
 /// Time for which a joint that is off its reference is driven on, for the board to find it \[s\].
 const LONGER_S: f64 = 3.0;
+/// Time for a store of parameters \[s\].
+const STORE_S: f64 = 0.05;
 /// Angle that homing comes back from \[rad\].
 const AWAY_RAD: f32 = 0.2;
 
@@ -100,7 +102,9 @@ fn expect(operator: &mut Operator, case: Option<&Case>, instant_s: f64) {
 /// Drives the joint through `phase`, the faults coming on the way, until it stops or the window is over.
 fn session(operator: &mut Operator, phase: Phase, case: Option<&Case>, instant_s: f64) -> Outcome {
     if phase == Phase::Start {
-        expect(operator, case, instant_s);
+        // A store is read once, within milliseconds.
+        let torn = case.is_some_and(|case| matches!(case.troubles[0].act, Act::TearStore(_)));
+        expect(operator, case, if torn { 0.0 } else { instant_s });
     }
     if !greeted(operator)? {
         return Ok(());
@@ -110,6 +114,9 @@ fn session(operator: &mut Operator, phase: Phase, case: Option<&Case>, instant_s
         // A store waits for the bridge to be off, and for the state off.
         let stores = case.is_some_and(|case| matches!(case.troubles[0].act, Act::CutStore(..)));
         expect(operator, case, if stores { 0.0 } else { instant_s });
+        if stores {
+            operator.drive(STORE_S)?;
+        }
     }
     if operator.make_ready()? != Reached::State {
         return Ok(());

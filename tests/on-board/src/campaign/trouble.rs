@@ -84,7 +84,7 @@ pub struct Trouble {
     pub place: Place,
     /// What is done.
     pub act: Act,
-    /// How long \[s\]; `None` is for good.
+    /// How long \[s\], and until something has noticed it; `None` is for good.
     pub lasts_s: Option<f64>,
 }
 
@@ -103,8 +103,6 @@ impl Trouble {
     }
 }
 
-/// Longest time that a short fault waits for something to notice it \[s\].
-const NOTICED_S: f64 = 0.5;
 /// Bytes that wait for the bus in a flood.
 const WAITING: usize = 1024;
 
@@ -163,10 +161,9 @@ impl Underway {
             && lasts_s < 1e-3
         {
             host.pass(lasts_s)?;
-            while this.effect(host) == 0 && host.board.time_s() < this.began_s + NOTICED_S {
-                host.pass(20e-6)?;
+            if this.effect(host) > 0 {
+                this.end(host);
             }
-            this.end(host);
         }
         this.attend(host)?;
         Ok(this)
@@ -208,9 +205,7 @@ impl Underway {
             _ => {}
         }
         let since_s = host.board.time_s() - self.began_s;
-        if self.trouble.lasts_s.is_some_and(|lasts_s| since_s >= lasts_s)
-            && (self.effect(host) > 0 || since_s > NOTICED_S)
-        {
+        if self.trouble.lasts_s.is_some_and(|lasts_s| since_s >= lasts_s) && self.effect(host) > 0 {
             self.end(host);
         }
         Ok(())
