@@ -181,7 +181,7 @@ pub fn set_rate_divider(divider: u16) {
 }
 
 /// Outputs off, from any context, with nothing but two writes. Before timer and port have their clocks nothing of the bridge is on, and
-/// their registers must not be touched (RM0440, 7.2.17).
+/// their registers must not be touched (RM0440, RCC, peripheral clock gating).
 pub fn off() {
     if pac::RCC.apb2enr().read().tim1en() {
         pac::TIM1.bdtr().modify(|break_register| break_register.set_moe(false));

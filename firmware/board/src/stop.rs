@@ -11,6 +11,12 @@ use embassy_stm32::pac;
 
 use crate::{bridge, retained, store_flash};
 
+// Microseconds since the start; 0 before the timer that counts them has its clock, for what ends a run that early is logged too.
+defmt::timestamp!("{=u64:us}", {
+    let counts = pac::RCC.apb1enr1().read().tim5en();
+    if counts { embassy_time::Instant::now().as_micros() } else { 0 }
+});
+
 /// The end was logged, or is being logged: if that fails, it is not tried again.
 static LOGGED: AtomicBool = AtomicBool::new(false);
 
