@@ -99,6 +99,7 @@ impl Input {
 }
 
 /// Bench and sensors.
+#[expect(clippy::struct_excessive_bools, reason = "independent marks of what a test does, no state machine")]
 #[derive(Debug, Clone)]
 pub(crate) struct Rig {
     bench: LiveBench,

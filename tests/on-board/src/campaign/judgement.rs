@@ -96,8 +96,9 @@ impl Judged {
         };
         let off =
             self.off_after_s.map_or(String::new(), |off_s| format!(", off after {:.3} ms", 1e3 * off_s));
-        let violations: String =
+        let violations: Vec<String> =
             self.violations.iter().map(|words| format!("; VIOLATION: {words}")).collect();
+        let violations = violations.concat();
         format!(
             "{} ({}): {verdict}{off}; noticed {:?}, {:.1} N, {:.3} rad, error {:.4} rad{violations}",
             self.name, self.words, self.effects, self.tension_n, self.angle_rad, self.error_rad
