@@ -100,8 +100,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         .collect();
     let what = what.join(" ");
     eprintln!(
-        "xtask: {}; the tasks are demo, test, bench, prove, paper, fuzz, firmware and clippy, see `cargo xtask --help`",
-        "xtask: {}; the tasks are demo, test, bench, prove, paper, faults, firmware and clippy, see `cargo xtask --help`",
+        "xtask: {}; the tasks are demo, test, bench, prove, paper, fuzz, faults, firmware and clippy, see `cargo xtask --help`",
         what.strip_prefix("error: ").unwrap_or(&what)
     );
     ExitCode::from(2)

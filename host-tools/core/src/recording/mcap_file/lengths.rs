@@ -84,6 +84,9 @@ fn behind(bytes: &[u8]) -> Result<(&[u8], &[u8]), Option<u64>> {
 mod tests {
     use super::*;
 
+    /// Opcode, parts of the record, and which of them are texts.
+    type Case = (u8, Vec<Vec<u8>>, &'static [usize]);
+
     /// Records by hand after the specification: each is read, and refused with the length where one of its texts claims more than is there.
     #[test]
     fn a_text_longer_than_its_record_is_refused_before_it_is_read() {
@@ -92,8 +95,6 @@ mod tests {
         let map = [&(pairs.len() as u32).to_le_bytes()[..], &pairs].concat();
         let zeros = |count: usize| vec![0; count];
         let none = 0_u32.to_le_bytes().to_vec();
-        /// Opcode, parts of the record, and which of them are texts.
-        type Case = (u8, Vec<Vec<u8>>, &'static [usize]);
         let cases: [Case; 6] = [
             (op::HEADER, vec![text("profile"), text("library")], &[0, 1]),
             (op::SCHEMA, vec![vec![1, 0], text("name"), text("json"), none.clone()], &[1, 2]),
