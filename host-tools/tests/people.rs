@@ -132,18 +132,21 @@ fn what_was_made_of_a_run_comes_as_json() {
     assert_eq!((&recorded["out"], &recorded["rows"]), (&"a.csv".into(), &facts[0]["rows"]));
     assert_eq!((&recorded["duration_s"], &recorded["tick_us"]), (&0.2.into(), &100.0.into()));
 
-    // Nothing that could be diagnosed is among them.
+    // A short recording that is whole, and a torn one.
     std::fs::create_dir(folder.path().join("runs")).unwrap();
+    let arguments =
+        ["--reference", "sine", "--amplitude", "0.3", "--home", "--seconds", "2", "--every", "20"];
+    let files = ["--out", "runs/whole.csv", "--rig", "runs/rig.toml"];
+    json(&[&["record", "--port", "sim"], &arguments[..], &files].concat(), 0);
     std::fs::write(folder.path().join("runs/torn.csv"), "t_s,duty\n0,x\n").unwrap();
-    std::fs::write(folder.path().join("runs/rig.toml"), "schema = \"bowden-rig/1\"\n").unwrap();
     let survey = json(&["survey", "runs", "--out", "found", "--quiet"], 3);
     assert_eq!(
         (&survey["recordings"], &survey["diagnosed"], &survey["kept"], &survey["left"]),
-        (&1.into(), &0.into(), &0.into(), &0.into())
+        (&2.into(), &1.into(), &0.into(), &0.into())
     );
     let failed = &survey["failed"][0];
-    assert_eq!(failed["recording"], "torn.csv");
-    assert!(failed["reason"].as_str().unwrap().contains("line 2"), "{failed}");
+    assert!(failed["recording"].as_str().unwrap().ends_with("torn.csv"), "{failed}");
+    assert!(failed["reason"].as_str().unwrap().contains("torn.csv:2"), "{failed}");
     assert_eq!(survey["page"], "found/survey.html");
 }
 

@@ -3,78 +3,17 @@
 //! The bench is stepped only when somebody looks or the bridge changes, so that it costs nothing in between; it lags the
 //! board by less than one step.
 
-use std::collections::VecDeque;
+mod wires;
 
 use virtual_bench::{BenchConfig, BenchError, Bridge, Channel, ConcealedEffect, LiveBench};
 
 use crate::analog;
 use crate::encoders::{Encoder, EncoderMounting, count_at};
 use crate::faults::{Altered, BridgeEvents, Cable, EncoderAt, Injection, Peaks, Rail, TensionAt};
+use wires::{CurrentFault, Late, TensionFault};
 
 /// Volts of a broken wire at the low and at the high rail.
 const RAIL_V: [f64; 2] = [0.02, 3.28];
-
-/// What a test does to one tension channel.
-#[derive(Debug, Clone)]
-struct TensionFault {
-    wire: Option<Rail>,
-    offset_n: f64,
-    gain: f64,
-    stuck_v: Option<f64>,
-    /// Channel whose sensor is plugged in here instead.
-    plugged_in: Option<usize>,
-    noise_n: f64,
-    late: Option<Late>,
-}
-
-/// A reading that comes late.
-#[derive(Debug, Clone, Default)]
-struct Late {
-    delay_s: f64,
-    /// Times \[s\] and readings \[N\], the oldest first; the first one is the present reading.
-    readings: VecDeque<(f64, f64)>,
-}
-
-impl Late {
-    /// Takes a new reading in and gives the late one.
-    fn pass(&mut self, at_s: f64, reading: f64) -> f64 {
-        self.readings.push_back((at_s, reading));
-        while self.readings.get(1).is_some_and(|(then_s, _)| *then_s <= at_s - self.delay_s) {
-            self.readings.pop_front();
-        }
-        self.readings.front().map_or(reading, |(_, then)| *then)
-    }
-}
-
-/// What a test does to the current channel.
-#[derive(Debug, Clone)]
-struct CurrentFault {
-    offset_a: f64,
-    gain: f64,
-    noise_a: f64,
-    wire: Option<Rail>,
-    stuck_v: Option<f64>,
-}
-
-impl Default for CurrentFault {
-    fn default() -> Self {
-        Self { offset_a: 0.0, gain: 1.0, noise_a: 0.0, wire: None, stuck_v: None }
-    }
-}
-
-impl Default for TensionFault {
-    fn default() -> Self {
-        Self {
-            wire: None,
-            offset_n: 0.0,
-            gain: 1.0,
-            stuck_v: None,
-            plugged_in: None,
-            noise_n: 0.0,
-            late: None,
-        }
-    }
-}
 
 /// An input of the converter that the board wires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -363,7 +302,7 @@ impl Rig {
                 self.tension_faults[tension_index(at)].noise_n = if on { noise_n } else { 0.0 };
             }
             Injection::TensionLate(at, delay_s) => {
-                let late = on.then(|| Late { delay_s, readings: VecDeque::new() });
+                let late = on.then(|| Late { delay_s, ..Late::default() });
                 self.tension_faults[tension_index(at)].late = late;
             }
             Injection::CurrentOffset(offset_a) => {

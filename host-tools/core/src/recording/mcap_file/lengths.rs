@@ -52,18 +52,7 @@ fn longer_text(opcode: u8, body: &[u8]) -> Option<u64> {
         let stepped = match part {
             Part::Fixed(length) => rest.get(*length..).ok_or(None),
             Part::Text | Part::Entries => behind(rest).map(|(_, rest)| rest),
-            Part::Texts => match behind(rest) {
-                Ok((mut texts, rest)) => loop {
-                    if texts.is_empty() {
-                        break Ok(rest);
-                    }
-                    match behind(texts) {
-                        Ok((_, after)) => texts = after,
-                        Err(longer) => break Err(longer),
-                    }
-                },
-                Err(longer) => Err(longer),
-            },
+            Part::Texts => behind(rest).and_then(|(texts, _)| behind_pairs(&rest[4..], texts.len())),
         };
         match stepped {
             Ok(after) => rest = after,
@@ -78,6 +67,15 @@ fn behind(bytes: &[u8]) -> Result<(&[u8], &[u8]), Option<u64>> {
     let (length, rest) = bytes.split_first_chunk::<4>().ok_or(None)?;
     let length = u32::from_le_bytes(*length);
     rest.split_at_checked(length as usize).ok_or(Some(length.into()))
+}
+
+/// What is behind the texts that begin within the first `length` bytes: a parser reads the last of them to its own end.
+fn behind_pairs(bytes: &[u8], length: usize) -> Result<&[u8], Option<u64>> {
+    let mut rest = bytes;
+    while bytes.len() - rest.len() < length {
+        rest = behind(rest)?.1;
+    }
+    Ok(rest)
 }
 
 #[cfg(test)]
@@ -122,5 +120,11 @@ mod tests {
         body[key..key + 4].copy_from_slice(&u32::MAX.to_le_bytes());
         body.push(0);
         assert!(matches!(parse_record(op::METADATA, &body), Err(McapError::RecordTooLarge { .. })));
+        // Of a map of one byte that byte is the first of a length.
+        let body = [text("name"), 1_u32.to_le_bytes().to_vec(), vec![0, 0, 0, 3]].concat();
+        assert!(matches!(
+            parse_record(op::METADATA, &body),
+            Err(McapError::RecordTooLarge { len: 0x300_0000, .. })
+        ));
     }
 }
