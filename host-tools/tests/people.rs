@@ -135,8 +135,8 @@ fn what_was_made_of_a_run_comes_as_json() {
     // A short recording that is whole, and a torn one.
     std::fs::create_dir(folder.path().join("runs")).unwrap();
     let arguments =
-        ["--reference", "sine", "--amplitude", "0.3", "--home", "--seconds", "2", "--every", "20"];
-    let files = ["--out", "runs/whole.csv", "--rig", "runs/rig.toml"];
+        ["--reference", "sine", "--amplitude", "0.3", "--home", "--seconds", "3.1", "--every", "40"];
+    let files = ["--out", "runs/whole.csv", "--rig", "runs/rig.toml", "--load", "2.5,0.03"];
     json(&[&["record", "--port", "sim"], &arguments[..], &files].concat(), 0);
     std::fs::write(folder.path().join("runs/torn.csv"), "t_s,duty\n0,x\n").unwrap();
     let survey = json(&["survey", "runs", "--out", "found", "--quiet"], 3);
