@@ -140,7 +140,8 @@ fn clear_damage() -> bool {
 
 /// For the NMI: whether it came from a store that is being read; keeps that for the reader.
 pub fn take_damage() -> bool {
-    let ours = READING.load(Ordering::SeqCst) && clear_damage();
+    // The stores lie in bank 2, the code in bank 1. Before the start has set memory up, [`READING`] says nothing.
+    let ours = FLASH.eccr().read().bk_ecc() && READING.load(Ordering::SeqCst) && clear_damage();
     if ours {
         DAMAGED.store(true, Ordering::SeqCst);
     }

@@ -71,12 +71,12 @@ fn damaged_code_opens_the_bridge_and_is_a_named_fault() -> Outcome {
     Ok(())
 }
 
-/// Before the bridge's timer has its clock, and behind. Until the start has read what began it, the reset behind the damage cannot be told
-/// from the power-on before it; from then on the board says why.
+/// Before memory is set up, before the bridge's timer has its clock, and behind. Until the start has read what began it, the reset behind the
+/// damage cannot be told from the power-on before it; from then on the board says why.
 #[test]
 fn damaged_code_during_the_start_starts_anew_with_the_motor_off() -> Outcome {
     let elf = image::firmware()?;
-    for (after_s, told) in [(8e-3, false), (20e-3, true)] {
+    for (after_s, told) in [(0.1e-3, false), (1e-3, false), (4e-3, false), (8e-3, false), (20e-3, true)] {
         let mut board = Board::builder(&elf).build()?;
         board.run_for(after_s)?;
         board.inject(Injection::FlashDamage);
