@@ -3,6 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`transport`] | bytes and a clock: [`serial`] port or [`sim`]ulated board, [`paced`] for those who watch it |
+//! | [`native_board`] | the board's control and services where there is no board |
 //! | [`client`] | one method a request, over any transport |
 //! | [`error`], [`losses`] | what goes wrong, and what gets lost |
 //! | [`parameters`] | the board's parameters by name, to and from a file |
@@ -38,6 +39,7 @@ pub mod holders;
 pub mod hub;
 pub mod investigate;
 pub mod losses;
+pub mod native_board;
 pub mod operator;
 pub mod paced;
 pub mod parameters;
