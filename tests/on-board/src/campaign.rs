@@ -10,7 +10,6 @@ pub mod healthy;
 pub mod judgement;
 pub mod operator;
 pub mod page;
-pub mod parallel;
 pub mod phase;
 pub mod run;
 pub mod trouble;

@@ -2,6 +2,7 @@
 
 use crate::Outcome;
 use crate::host::Host;
+use crate::trial::STEPS_PER_UNIT;
 
 /// Error of the true joint angle against the reference of the same tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +33,7 @@ pub fn follow_truth(host: &mut Host, seconds: f64) -> Outcome<LoopError> {
     let (mut squares, mut largest, mut found) = (0.0, 0.0_f64, 0);
     for (tick, angle_rad) in truth {
         if let Ok(at) = samples.binary_search_by_key(&tick, |(tick, _)| *tick) {
-            let reference_rad = f64::from(samples[at].1.reference_raw) / f64::from(1 << 20);
+            let reference_rad = f64::from(samples[at].1.reference_raw) / STEPS_PER_UNIT;
             let error_rad = angle_rad - reference_rad;
             squares += error_rad * error_rad;
             largest = largest.max(error_rad.abs());

@@ -15,6 +15,7 @@ pub mod host;
 pub mod image;
 pub mod load;
 pub mod paper;
+pub mod parallel;
 pub mod telemetry;
 pub mod ticks;
 pub mod tool;

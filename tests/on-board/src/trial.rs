@@ -20,7 +20,7 @@ const LOOK_S: f64 = 1e-3;
 /// Time in which homing has to end \[s\].
 const HOMING_S: f64 = 10.0;
 /// Steps of a reference in telemetry: 2⁻²⁰ rad or N·m.
-const STEPS_PER_UNIT: f64 = 1_048_576.0;
+pub(crate) const STEPS_PER_UNIT: f64 = 1_048_576.0;
 
 /// How the sheaths are moved.
 #[derive(Debug, Clone)]

@@ -5,11 +5,10 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bowden_on_board_tests::corrections::page::{HEAD, Row, page};
 use bowden_on_board_tests::corrections::{Case, cases, write};
+use bowden_on_board_tests::parallel::in_parallel;
 use bowden_on_board_tests::{Failure, Outcome, fail, image};
 
 /// Cases that are run at the same time; a diagnosis takes all processors by itself.
@@ -64,27 +63,15 @@ fn run(options: &Options) -> Outcome {
         return fail(format!("no effect is named {}", options.names.join(", ")));
     }
     println!("{HEAD}");
-    let next = AtomicUsize::new(0);
-    let rows: Mutex<Vec<(usize, Outcome<Row>)>> = Mutex::default();
-    std::thread::scope(|scope| {
-        for _ in 0..AT_ONCE {
-            scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(case) = cases.get(at) else { break };
-                    let row = measured(case, &elf, options);
-                    match &row {
-                        Ok(row) => println!("{}", row.line()),
-                        Err(failure) => println!("{}: {failure}", case.name),
-                    }
-                    rows.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((at, row));
-                }
-            });
+    let rows = in_parallel(AT_ONCE, &cases, |case| {
+        let row = measured(case, &elf, options);
+        match &row {
+            Ok(row) => println!("{}", row.line()),
+            Err(failure) => println!("{}: {failure}", case.name),
         }
-    });
-    let mut rows = rows.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    rows.sort_by_key(|(at, _)| *at);
-    let rows: Vec<Row> = rows.into_iter().map(|(_, row)| row).collect::<Outcome<_>>()?;
+        row
+    })?;
+    let rows: Vec<Row> = rows.into_iter().collect::<Outcome<_>>()?;
     if let Some(path) = &options.page {
         write(path, &page(&rows, &options.provenance))?;
         println!("{}", path.display());

@@ -8,10 +8,10 @@ use bowden_on_board_tests::campaign::case::{Case, drawn};
 use bowden_on_board_tests::campaign::healthy::Healthy;
 use bowden_on_board_tests::campaign::judgement::{Judged, judge};
 use bowden_on_board_tests::campaign::page;
-use bowden_on_board_tests::campaign::parallel::in_parallel;
 use bowden_on_board_tests::campaign::phase::Phase;
 use bowden_on_board_tests::campaign::run::{run, stored};
 use bowden_on_board_tests::corrections::write;
+use bowden_on_board_tests::parallel::in_parallel;
 use bowden_on_board_tests::{Failure, Outcome, fail, image};
 
 const HELP: &str = "cargo xtask faults [--seed N] [--cases N] [--only PATTERN] [--jobs N] [--minutes N]
@@ -117,7 +117,7 @@ fn campaign(options: &Options) -> Outcome {
         };
         println!("{}", judged.line());
         Some(judged)
-    })
+    })?
     .into_iter()
     .flatten()
     .collect();

@@ -6,12 +6,16 @@ use super::case::BENCH_SEEDS;
 use super::operator::Look;
 use super::phase::Phase;
 use super::run::{Run, healthy};
+use crate::parallel::in_parallel;
 use crate::{Failure, Outcome, fail};
 
 /// Factor on the largest value of the healthy runs of a phase beyond which a run is not harmless \[1\].
 pub const FACTOR: f64 = 1.5;
 /// A count of an encoder, on top of that for the angle \[rad\].
 pub const COUNT_RAD: f64 = std::f64::consts::TAU / 4096.0;
+
+/// What a fault may delay the joint by, for which the healthy runs go on behind the last moment of a fault \[s\].
+const DELAY_S: f64 = 0.2;
 
 /// Largest values of the healthy runs of a phase.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -81,10 +85,10 @@ impl Healthy {
     pub fn measure(elf: &[u8], flash: &[u8], phases: &[Phase], jobs: usize) -> Outcome<Self> {
         let runs: Vec<(Phase, u64)> =
             phases.iter().flat_map(|phase| BENCH_SEEDS.map(|seed| (*phase, seed))).collect();
-        let results = super::parallel::in_parallel(jobs, &runs, |(phase, seed)| {
-            healthy(elf, flash, *phase, *seed, latest_s(*phase))
+        let results = in_parallel(jobs, &runs, |(phase, seed)| {
+            healthy(elf, flash, *phase, *seed, phase.instants_s()[1] + DELAY_S)
                 .map_err(|Failure(text)| Failure(format!("healthy {phase}, seed {seed}: {text}")))
-        });
+        })?;
         let mut this = Self::default();
         for ((phase, seed), run) in runs.into_iter().zip(results) {
             let run = run?;
@@ -131,16 +135,6 @@ impl Healthy {
             .filter(|look| look.at_s >= since_s)
             .filter_map(|look| Some((look.angle_rad - legs.at(look)?).abs()));
         errors.any(|error_rad| error_rad > bound_rad)
-    }
-}
-
-/// Latest moment of a fault in `phase` \[s\], and time for what a fault delays.
-const fn latest_s(phase: Phase) -> f64 {
-    match phase {
-        Phase::Start | Phase::SelfTest | Phase::Homing => 0.0,
-        Phase::Hold => 2.1,
-        Phase::Slow | Phase::Reversal => 1.0,
-        Phase::Fast => 1.5,
     }
 }
 

@@ -1,14 +1,19 @@
 //! What a case was: named, harmless, or silently wrong.
 
+use bowden_control::parameters::Parameters;
+use bowden_link::State;
+
 use super::case::Case;
 use super::catalogue::Subject;
 use super::healthy::Healthy;
 use super::phase::Phase;
 use super::run::Run;
-use bowden_link::State;
 
-/// Limit of a tension: the parameter `tension.over` \[N\].
-pub const TENSION_LIMIT_N: f64 = 90.0;
+/// Limit of a tension: what `tension.over` is by default \[N\].
+pub fn tension_limit_n() -> f64 {
+    f64::from(Parameters::default().tension.over)
+}
+
 /// How far a tension may go beyond it \[1\].
 pub const TENSION_EXCESS: f64 = 0.05;
 /// Longest time from the beginning of the tick that finds a fault to the open bridge: one tick \[s\].
@@ -145,8 +150,9 @@ fn violations(run: &Run, stopped: bool, tension_n: f64) -> Vec<String> {
             1e6 * behind_s
         ));
     }
-    if tension_n > (1.0 + TENSION_EXCESS) * TENSION_LIMIT_N {
-        found.push(format!("{tension_n:.1} N, limit {TENSION_LIMIT_N} N"));
+    let limit_n = tension_limit_n();
+    if tension_n > (1.0 + TENSION_EXCESS) * limit_n {
+        found.push(format!("{tension_n:.1} N, limit {limit_n} N"));
     }
     if stopped && run.restarted {
         found.push("the motor was on again behind the stop, nobody having asked for it".to_owned());
@@ -176,7 +182,7 @@ fn unnamed(
     let mut beyond = Vec::new();
     for (what, unit, got, bound) in [
         ("angle off", "rad", error_rad, bounds.error_rad),
-        ("tension", "N", tension_n, bounds.tension_n.min(TENSION_LIMIT_N)),
+        ("tension", "N", tension_n, bounds.tension_n.min(tension_limit_n())),
         ("current", "A", run.peaks.current_a, bounds.current_a),
     ] {
         if got > bound {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::catalogue::KINDS;
 use super::healthy::{FACTOR, Healthy};
-use super::judgement::{Judged, TENSION_EXCESS, TENSION_LIMIT_N, Verdict};
+use super::judgement::{Judged, TENSION_EXCESS, Verdict, tension_limit_n};
 use super::phase::Phase;
 
 /// Row of the cases with two faults.
@@ -67,7 +67,7 @@ fn worst(values: impl Iterator<Item = f64>, digits: usize) -> String {
 }
 
 fn excess_percent(case: &Judged) -> f64 {
-    (100.0 * (case.tension_n / TENSION_LIMIT_N - 1.0)).max(0.0)
+    (100.0 * (case.tension_n / tension_limit_n() - 1.0)).max(0.0)
 }
 
 /// The table by kind and phase.
@@ -138,7 +138,7 @@ fn envelopes(healthy: &Healthy) -> String {
                 seen.error_rad,
                 bounds.error_rad,
                 seen.tension_n,
-                bounds.tension_n.min(TENSION_LIMIT_N),
+                bounds.tension_n.min(tension_limit_n()),
                 seen.current_a,
                 bounds.current_a,
             )
@@ -181,10 +181,11 @@ fn words() -> String {
          - **Without proof** (**U**): the emulated chip counted nothing that the fault altered: no conversion, frame, request of DMA,\n  \
            transaction, step of the bench or reset. It counts at each place; of two faults both have to be there.\n\
          - **Violation**: motor off more than one tick (100 us) behind the beginning of the tick in the record, a true tension more than\n  \
-           {:.0} % over the {TENSION_LIMIT_N} N of `tension.over`, or the bridge closed again without an order.\n\
+           {:.0} % over the {} N of `tension.over`, or the bridge closed again without an order.\n\
          - *Motor off after* counts from the fault, *behind detection* from the beginning of the control tick in the record (0 where\n  \
            hardware was faster); both are the worst of the row, and so are tension and angle, up to 0.2 s behind the stop.",
-        100.0 * TENSION_EXCESS
+        100.0 * TENSION_EXCESS,
+        tension_limit_n()
     )
 }
 

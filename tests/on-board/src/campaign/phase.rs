@@ -61,22 +61,28 @@ impl Phase {
         Reference::Generated { shape, amplitude, offset: 0.0, frequency_hz }
     }
 
-    /// Time from the phase's beginning to the fault \[s\].
-    pub fn instant_s(self, draw: &mut Draw) -> f64 {
+    /// First and last time from the phase's beginning at which a fault comes \[s\].
+    pub const fn instants_s(self) -> [f64; 2] {
         match self {
             // Up to the greeting, or to the state ready.
-            Self::Start => draw.uniform(0.0, 0.05),
-            Self::SelfTest => draw.uniform(0.0, 0.2),
+            Self::Start => [0.0, 0.05],
+            Self::SelfTest => [0.0, 0.2],
             // 0.2 rad take 0.5 s.
-            Self::Homing => draw.uniform(0.02, 0.4),
+            Self::Homing => [0.02, 0.4],
             // Standing on the second stair, behind the ramp of 0.5 s.
-            Self::Hold => draw.uniform(1.3, 1.9),
+            Self::Hold => [1.3, 1.9],
             // Behind the ramp.
-            Self::Slow => draw.uniform(0.55, 0.8),
-            Self::Fast => draw.uniform(0.55, 1.3),
+            Self::Slow => [0.55, 0.8],
+            Self::Fast => [0.55, 1.3],
             // The first turning point of the sine behind the ramp is at 0.75 s.
-            Self::Reversal => 0.75 + draw.uniform(-0.01, 0.01),
+            Self::Reversal => [0.74, 0.76],
         }
+    }
+
+    /// Time from the phase's beginning to the fault \[s\].
+    pub fn instant_s(self, draw: &mut Draw) -> f64 {
+        let [first_s, last_s] = self.instants_s();
+        draw.uniform(first_s, last_s)
     }
 
     /// Time that is driven behind the fault, or behind the end of the phase \[s\].

@@ -10,6 +10,7 @@ use super::operator::{Look, Operator, Reached};
 use super::phase::Phase;
 use super::trouble::Act;
 use crate::host::Host;
+use crate::trial::STEPS_PER_UNIT;
 use crate::{Failure, Outcome, fail};
 
 /// Time that the joint is watched behind a stop, nobody ordering anything \[s\].
@@ -276,6 +277,6 @@ fn references(operator: &mut Operator) -> Outcome<Vec<(u32, f64)>> {
     Ok(samples
         .into_iter()
         .filter(|(_, sample)| driven(sample.state))
-        .map(|(tick, sample)| (tick, f64::from(sample.reference_raw) / f64::from(1 << 20)))
+        .map(|(tick, sample)| (tick, f64::from(sample.reference_raw) / STEPS_PER_UNIT))
         .collect())
 }
