@@ -9,7 +9,8 @@ use std::process::Command;
 
 use clap::Args;
 
-use crate::process::{self, cargo, rustc, target_folder, workspace};
+use crate::process::{self, cargo, target_folder, workspace};
+use crate::toolchain::Toolchain;
 
 /// What is fuzzed, and for how long.
 #[derive(Debug, Args)]
@@ -39,7 +40,7 @@ const LIMITS: [&str; 4] = ["-max_len=6000", "-timeout=20", "-rss_limit_mb=6000",
 /// # Errors
 /// When the targets cannot be built, or one has found something: the input lies where the line says.
 pub fn run(options: &Options) -> Result<(), String> {
-    let triple = host_triple()?;
+    let triple = Toolchain::active()?.host;
     let mut build = cargo(&[
         "build",
         "--package",
@@ -94,12 +95,6 @@ fn fuzz(program: &Path, name: &str, seconds: u32) -> Result<(), String> {
 /// Arguments as cargo takes them from the environment.
 fn encoded(arguments: &str) -> String {
     arguments.split_whitespace().collect::<Vec<_>>().join("\u{1f}")
-}
-
-fn host_triple() -> Result<String, String> {
-    let version = process::output(&mut rustc(&["-vV"]))?;
-    let triple = version.lines().find_map(|line| line.strip_prefix("host: "));
-    triple.map(str::to_owned).ok_or_else(|| "`rustc -vV` names no host".to_owned())
 }
 
 #[cfg(test)]

@@ -13,6 +13,8 @@ pub struct Toolchain {
     pub version: String,
     /// Commit that it was built from.
     pub commit: String,
+    /// Target that it compiles for by itself.
+    pub host: String,
 }
 
 impl Toolchain {
@@ -27,7 +29,8 @@ impl Toolchain {
             let found = verbose_version.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(": "));
             found.map(str::to_owned).ok_or_else(|| format!("`rustc --version --verbose` tells no {key}"))
         };
-        Ok(Self { sysroot: sysroot.into(), version: value("release")?, commit: value("commit-hash")? })
+        let (version, commit, host) = (value("release")?, value("commit-hash")?, value("host")?);
+        Ok(Self { sysroot: sysroot.into(), version, commit, host })
     }
 
     /// Folder of the compiled libraries of a target.
@@ -51,6 +54,7 @@ mod tests {
         let toolchain = Toolchain::parse("/opt/rust", VERBOSE).unwrap();
         assert_eq!(toolchain.version, "1.95.0");
         assert_eq!(toolchain.commit, "59807616e1fa2540724bfbac14d7976d7e4a3860");
+        assert_eq!(toolchain.host, "x86_64-unknown-linux-gnu");
         assert_eq!(
             toolchain.libraries("thumbv7em-none-eabihf"),
             Path::new("/opt/rust/lib/rustlib/thumbv7em-none-eabihf/lib")

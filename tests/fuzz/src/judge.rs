@@ -1,6 +1,6 @@
 //! What every reader owes: an answer or one line that says where, within a bound of memory.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use bowden_core::outcome::Failure;
 use peak_alloc::PeakAlloc;
@@ -15,10 +15,16 @@ const OWN: usize = 24 << 20;
 /// text and what is grown into.
 const FOR_EACH_BYTE: usize = 8 * 1030;
 
-/// Peaks of several threads could not be told apart.
+/// Peaks of several threads could not be told apart: what is done while one target runs counts for it.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// Runs `read`, whose peak of memory is bounded by the length of what it reads.
+/// Keeps other targets of the process waiting.
+pub fn alone() -> MutexGuard<'static, ()> {
+    // Whoever panicked with it in hand left nothing behind.
+    ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs `read`, whose peak of memory is bounded by the length of what it reads, while this thread is [`alone`].
 ///
 /// # Panics
 /// If it takes more.
@@ -31,8 +37,6 @@ pub fn bounded<T>(input: &[u8], read: impl FnOnce() -> T) -> T {
 /// # Panics
 /// If it takes more.
 pub fn bounded_beside<T>(more: usize, input: &[u8], read: impl FnOnce() -> T) -> T {
-    // Whoever panicked with it in hand left nothing behind.
-    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     MEMORY.reset_peak_usage();
     let before = MEMORY.current_usage();
     let result = read();

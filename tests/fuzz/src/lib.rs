@@ -22,6 +22,7 @@ mod texts;
 mod wire;
 
 pub use change::{Change, changed};
+pub use judge::alone;
 
 /// Something that reads bytes from outside.
 #[derive(Clone, Copy, Debug)]

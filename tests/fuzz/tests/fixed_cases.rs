@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use bowden_fuzz::requests::carry_out;
-use bowden_fuzz::{Change, Target, changed, corpus, target};
+use bowden_fuzz::{Change, Target, alone, changed, corpus, target};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestError, TestRunner};
 
@@ -39,6 +39,7 @@ fn input(seeds: Vec<Vec<u8>>) -> impl Strategy<Value = Vec<u8>> {
 }
 
 fn run(name: &str) {
+    let _alone = alone();
     let Target { run, seeds, cases, .. } = *target(name).expect("a target of this name");
     for (file, bytes) in corpus::inputs(name) {
         let ended = catch_unwind(AssertUnwindSafe(|| run(&bytes)));
@@ -89,6 +90,7 @@ targets! { wire host requests rig study plan parameters ripple_table csv gzip mc
 /// The sequences that others are made of drive the joint, two of them far; otherwise what is judged would be a joint at rest.
 #[test]
 fn the_seeds_of_the_requests_move_the_joint() {
+    let _alone = alone();
     for (number, seed) in (0..).zip((target("requests").expect("a target of this name").seeds)()) {
         let tally = carry_out(&seed);
         assert!(tally.driven > 3000, "{number}: {tally:?}");
