@@ -34,6 +34,8 @@ const TICKS: u32 = 60_000;
 pub struct Tally {
     /// Ticks with the bridge on.
     pub driven: u32,
+    /// Ticks with the duty at its limit.
+    pub at_duty_limit: u32,
     /// Faults found.
     pub faults: u32,
     /// Requests refused.

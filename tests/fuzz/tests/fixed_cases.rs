@@ -95,5 +95,6 @@ fn the_seeds_of_the_requests_move_the_joint() {
         let tally = carry_out(&seed);
         assert!(tally.driven > 3000, "{number}: {tally:?}");
         assert!(number > 1 || tally.farthest_rad > 0.25, "{number}: {tally:?}");
+        assert!(number != 4 || tally.at_duty_limit > 100, "{number}: {tally:?}");
     }
 }

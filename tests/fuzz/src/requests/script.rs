@@ -177,7 +177,8 @@ impl<'b> Script<'b> {
     }
 }
 
-/// A sine that is followed, and stopped by a fault; a torque within limits that are narrowed while it acts; a stream; homing.
+/// A sine that is followed, and stopped by a fault; a torque within limits that are narrowed while it acts; a stream; homing; a torque
+/// whose duty is limited to a ninth, and one whose current is limited to 1.2 A.
 pub fn seeds() -> Vec<Vec<u8>> {
     let sine = [6, 2, 0, 192, 130, 50];
     let followed = [&[0][..], &sine, &[2, 0, 9, 255, 9, 255, 9, 255, 15, 0x12, 90, 9, 30, 14, 1, 8, 20]];
@@ -187,5 +188,8 @@ pub fn seeds() -> Vec<Vec<u8>> {
         &[6, 1, 14, 8, 140, 150, 120, 2, 0, 9, 60, 14, 8, 200, 60, 130, 9, 200, 16, 200, 9, 255, 9, 255],
     ];
     let home = [&[0][..], &sine, &[2, 2, 9, 255, 9, 100, 14, 0, 8, 2, 0, 5, 9, 255, 2, 3, 9, 200]];
-    [followed.concat(), torque.concat(), stream.concat(), home.concat()].into()
+    let narrowed = [(0, 12), (1, 40)].map(|(limit, percent)| {
+        [&[0][..], &[6, 0, 160, 2, 1, 9, 90, 11, limit, 5, percent, 9, 255]].concat()
+    });
+    [followed.concat(), torque.concat(), stream.concat(), home.concat()].into_iter().chain(narrowed).collect()
 }
