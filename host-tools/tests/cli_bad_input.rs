@@ -217,6 +217,11 @@ fn a_recording_that_cannot_be_used_is_named_with_its_place() {
             good_csv().into(),
             "rec.mcap: byte 0: not the start of an MCAP file; if it is a table, call it .csv",
         ),
+        (
+            "rec.parquet",
+            good_csv().into(),
+            "rec.parquet: byte 0: not the start of a Parquet file; if it is a table, call it .csv",
+        ),
         ("rec.csv", short.into(), "rec.csv:11: got 10 samples, expected at least 50; record longer"),
         (
             "rec.csv",

@@ -15,7 +15,7 @@ use crate::output;
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 impl Recording {
-    /// Reads a file. The content decides between CSV, gzipped CSV and MCAP, whatever the file is called.
+    /// Reads a file. The content decides between CSV, gzipped CSV, MCAP and Parquet; a table is not called `.mcap` or `.parquet`.
     ///
     /// A file that ends early (a last line without its end that makes no whole row, gzip data or an MCAP file
     /// without its end) gives the samples that are whole and a note.
@@ -39,7 +39,11 @@ impl Recording {
         let length = file.metadata().map_err(|error| unreadable(&error))?.len();
         let mut file = BufReader::with_capacity(READ_BUFFER, file);
         let start = file.fill_buf().map_err(|error| unreadable(&error))?;
-        let named_mcap = Format::of(path).is_some_and(|format| format == Format::Mcap);
+        let no_table = match Format::of(path) {
+            Some(Format::Mcap) => Some("an MCAP file"),
+            Some(Format::Parquet) => Some("a Parquet file"),
+            _ => None,
+        };
         if start.is_empty() {
             return Err(Failure::bad_input(format!(
                 "{source}:1: the file is empty, expected a header line with t_s; record again"
@@ -51,9 +55,9 @@ impl Recording {
         if start.starts_with(parquet_file::MAGIC) {
             return parquet_file::read(path, source, options);
         }
-        let recording = if named_mcap {
+        let recording = if let Some(expected) = no_table {
             Err(Failure::bad_input(format!(
-                "{source}: byte 0: not the start of an MCAP file; if it is a table, call it .csv"
+                "{source}: byte 0: not the start of {expected}; if it is a table, call it .csv"
             )))
         } else if start.starts_with(&GZIP_MAGIC) {
             comma_separated::read(flate2::bufread::MultiGzDecoder::new(file), source, options)

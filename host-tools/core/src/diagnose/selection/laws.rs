@@ -1,6 +1,8 @@
 //! Laws that the data ask for in place of the names, or beside them: tried once no further name is found, and held to more than a
 //! name is.
 
+use bowden_model::effect::{ActiveEffect, Component};
+
 use super::{Chosen, Fitted, Kind, PROMISING, Round, Search, Worth};
 use crate::diagnose::policy::{POLICY, Policy};
 use crate::diagnose::unexplained::unexplained;
@@ -15,8 +17,8 @@ const RIVALLING: f64 = 0.5;
 
 impl Search<'_> {
     /// Puts one law in the place of all names, or of all but the first, where it predicts clearly better than they do: by [`Policy::worth_stating`]
-    /// what one name does, and what several do by as much as a name must be worth. `nothing` is the fit without either. Says whether it
-    /// did.
+    /// what one name does, and by as much as a name must be worth what several do, or one that is of the same sensor. `nothing` is the fit
+    /// without either. Says whether it did.
     pub(super) fn law_in_place_of_names(
         &self,
         nothing: &Fitted,
@@ -25,11 +27,16 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
         for kept in 0..chosen.len().min(2) {
-            let better: Worth =
-                if chosen.len() - kept > 1 { Policy::worth_naming } else { Policy::worth_stating };
-            if self.progress.interrupted() || !better(&POLICY, present.loss, 0.0) {
+            let replaced = &chosen[kept..];
+            let several = replaced.len() > 1;
+            let worth_looking: Worth = if several { Policy::worth_naming } else { Policy::worth_stating };
+            if self.progress.interrupted() || !worth_looking(&POLICY, present.loss, 0.0) {
                 return Ok(false);
             }
+            let better = |law: &ActiveEffect| -> Worth {
+                let like_with_like = replaced.iter().all(|name| are_of_one_sensor(&name.effect, law));
+                if several || like_with_like { Policy::worth_naming } else { Policy::worth_stating }
+            };
             let beside = match chosen.first().filter(|_| kept == 1) {
                 Some(first) => {
                     let (layout, with) = nothing.layout.with(&nothing.solution.model, first.effect);
@@ -43,7 +50,9 @@ impl Search<'_> {
                 self.one_more(&before, Kind::Law, (RIVALLING * removed_share).max(PROMISING))?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
             if let Some((found, with)) = self.found(&before, &beside, fits, Policy::worth_stating)?
-                && with.shows(present, &with.newest(), |without, with| better(&POLICY, without, with))
+                && with.shows(present, &with.newest(), |without, with| {
+                    better(&found.effect)(&POLICY, without, with)
+                })
             {
                 chosen.truncate(kept);
                 chosen.push(found);
@@ -83,5 +92,45 @@ impl Search<'_> {
             self.prune(present, chosen)?;
         }
         Ok(())
+    }
+}
+
+/// Whether both change what one sensor reads: their losses differ by its channel alone, and not by all that a joint does.
+fn are_of_one_sensor(one: &ActiveEffect, other: &ActiveEffect) -> bool {
+    let of_sensor = |effect: &ActiveEffect| effect.descriptor().component == Component::Sensors;
+    of_sensor(one) && of_sensor(other) && one.target.overlaps(other.target)
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effect::{ActiveEffect, Effect, Target};
+    use bowden_model::effects;
+    use bowden_model::law;
+
+    use super::are_of_one_sensor;
+
+    fn of(id: &str, target: Target) -> ActiveEffect {
+        let law = || law::find(id).map(|law| law as &'static dyn Effect);
+        let effect = effects::find(id).or_else(law).expect("an effect of this name");
+        ActiveEffect { target, ..ActiveEffect::with_defaults(effect) }
+    }
+
+    #[test]
+    fn a_zero_is_compared_with_a_law_of_its_own_sensor_and_with_no_other() {
+        let of_f3 = of("sensor_offset", Target::One(Channel::F3));
+        for (id, target, compared) in [
+            ("law_reading_sets_in", Target::One(Channel::F3), true),
+            ("law_reading_sets_in", Target::Tensions, true),
+            ("law_reading_sets_in", Target::One(Channel::F4), false),
+            ("law_joint_torque_by_angle", Target::None, false),
+        ] {
+            assert_eq!(are_of_one_sensor(&of_f3, &of(id, target)), compared, "{id} of {target:?}");
+        }
+        // Two without a channel are of one target, and of no sensor.
+        assert!(!are_of_one_sensor(
+            &of("joint_spring", Target::None),
+            &of("law_joint_torque_by_angle", Target::None)
+        ));
     }
 }
