@@ -17,6 +17,7 @@ use crate::encoder::channel::EncoderFault;
 use crate::encoder::stuck::StuckWatch;
 use crate::impedance::ImpedanceInput;
 use crate::motion_watch::{MotionWatch, Turn};
+use crate::motor_circuit::MotorCircuit;
 use crate::observer::{Motion, Observer};
 use crate::reference::{Origin, ReferenceConfig, ReferenceState};
 use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
@@ -34,6 +35,7 @@ pub struct Controller {
     encoders: [EncoderChannel; 2],
     stuck: StuckWatch,
     motion: MotionWatch,
+    circuit: MotorCircuit,
     tensions: TensionChannels,
     supply: Supply,
     observer: Observer,
@@ -88,6 +90,7 @@ impl Controller {
             encoders: [EncoderChannel::default(); 2],
             stuck: StuckWatch::default(),
             motion: MotionWatch::default(),
+            circuit: MotorCircuit::default(),
             tensions: TensionChannels::default(),
             supply: Supply::default(),
             observer: Observer::default(),
@@ -114,7 +117,7 @@ impl Controller {
         let readings = self.sense(input, &mut limits);
         let mut found = ordered.or(readings.found);
         if found.is_none() {
-            let situation = Situation {
+            let situation = || Situation {
                 tension_raw: input.tension_raw,
                 tensions: readings.tensions,
                 counts: readings.counts,
@@ -122,15 +125,20 @@ impl Controller {
                 theta_out: readings.theta[1],
                 arrived: !self.starts && self.reference.value_bits() == 0,
             };
-            found = self.supervisor.step(&self.config.supervisor, &situation);
+            found = self.supervisor.step(&self.config.supervisor, situation);
         }
         let tripped = found.and_then(|found| self.supervisor.trip(found, tick));
         let state = self.supervisor.state();
         let action = if state.drives() {
-            self.drive(&readings, inbox, &mut limits)
+            let action = self.drive(&readings, inbox, &mut limits);
+            if self.motion.samples_now() {
+                self.circuit.sample(readings.current, action.duty_raw);
+            }
+            action
         } else {
             self.stuck.reset();
             self.motion.reset();
+            self.circuit.reset();
             self.starts = false;
             // A joint that rests expects no friction.
             self.loops = Loops::default();
@@ -211,6 +219,7 @@ impl Controller {
         self.encoders.iter_mut().for_each(EncoderChannel::reset);
         self.stuck = StuckWatch::default();
         self.motion = MotionWatch::default();
+        self.circuit = MotorCircuit::default();
         self.tensions = TensionChannels::default();
         self.supply = Supply::default();
         self.observer = Observer::default();
@@ -294,7 +303,7 @@ impl Controller {
                 .or(supply.found)
                 .or(encoder)
                 .or(tension)
-                .or_else(|| self.watch_motion(input, counts, theta[1], &tensions))
+                .or_else(|| self.watch_motion(input, counts, theta, &tensions, supply.bus_filtered))
         } else {
             None
         };
@@ -307,8 +316,9 @@ impl Controller {
         &mut self,
         input: &TickInput,
         counts: [i32; 2],
-        theta_out: Angle,
+        theta: [Angle; 2],
         tensions: &[Tension; 4],
+        bus: Voltage,
     ) -> Option<Detection> {
         if !self.supervisor.state().drives() {
             return None;
@@ -319,11 +329,16 @@ impl Controller {
             return Some(Detection { fault: bowden_link::Fault::EncoderStuck, channel, got, limit });
         }
         match self.motion.turn(&self.config.motion)? {
+            Turn::Voltage => {
+                self.circuit.voltage(&self.config.circuit, theta[0], bus);
+                None
+            }
+            Turn::Current => self.circuit.current(&self.config.circuit),
             Turn::Joint => {
                 let follows =
                     self.supervisor.state() == State::Run && self.supervisor.mode() == Mode::Position;
                 let reference = follows.then(|| Angle::from_bits(self.reference.value_bits()));
-                self.motion.joint(&self.config.motion, theta_out, reference)
+                self.motion.joint(&self.config.motion, theta[1], reference)
             }
             Turn::Tension(n) => self.motion.tension(&self.config.motion, n, &input.tension_raw, tensions),
         }

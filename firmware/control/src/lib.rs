@@ -33,6 +33,7 @@ pub mod drive;
 pub mod encoder;
 pub mod impedance;
 pub mod motion_watch;
+pub mod motor_circuit;
 pub mod observer;
 pub mod parameters;
 pub mod reference;

@@ -25,7 +25,7 @@ pub const LOOK_S: f32 = 0.01;
 /// What is allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionConfig {
-    /// Ticks from one look to the next, at least 5.
+    /// Ticks from one look to the next, at least 8.
     pub look_ticks: u16,
     /// Largest turn of the joint between two looks.
     pub travel: Angle,
@@ -68,9 +68,19 @@ pub struct MotionWatch {
     begun: u8,
 }
 
+/// Samples of duty and current in a round of looks of this many ticks.
+#[must_use]
+pub const fn samples(look_ticks: u16) -> u16 {
+    look_ticks / 4
+}
+
 /// What a tick looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
+    /// Voltage of the motor since the last look, see [`crate::motor_circuit`].
+    Voltage,
+    /// Its current.
+    Current,
     /// Angle of the joint.
     Joint,
     /// A tension channel, 0 to 3.
@@ -92,11 +102,23 @@ impl MotionWatch {
             self.left = config.look_ticks;
         }
         self.left -= 1;
-        match self.left {
-            4 => Some(Turn::Joint),
-            5.. => None,
-            channel => Some(Turn::Tension(channel as usize)),
+        // Nearly always.
+        if self.left > 6 {
+            return None;
         }
+        Some(match self.left {
+            6 => Turn::Voltage,
+            5 => Turn::Current,
+            4 => Turn::Joint,
+            channel => Turn::Tension(channel as usize),
+        })
+    }
+
+    /// Whether this tick takes a sample of duty and current: every fourth does.
+    #[inline]
+    #[must_use]
+    pub const fn samples_now(&self) -> bool {
+        self.left % 4 == 3
     }
 
     /// A look at the joint: speed, and where it follows `reference`, range and error. The first fault.
@@ -220,20 +242,25 @@ mod tests {
         joint.or(stuck)
     }
 
-    /// By hand: of seven ticks the third looks at the joint, the others behind it at f4 to f1.
+    /// By hand: of nine ticks the third and the fourth look at the motor, the fifth at the joint, the others behind it at f4 to f1; the second
+    /// and the sixth take samples.
     #[test]
     fn every_round_looks_at_each_once() {
         let mut watch = MotionWatch::default();
-        let round = [None, None, Some(Turn::Joint)];
+        let config = || MotionConfig { look_ticks: 9, ..CONFIG() };
+        let round = [None, None, Some(Turn::Voltage), Some(Turn::Current), Some(Turn::Joint)];
         let channels = [3, 2, 1, 0].map(|channel| Some(Turn::Tension(channel)));
         let expected = [&round[..], &channels].concat();
         for _ in 0..2 {
-            let turns: Vec<_> = (0..7).map(|_| watch.turn(&CONFIG())).collect();
+            let turns: Vec<_> = (0..9).map(|_| (watch.turn(&config()), watch.samples_now())).collect();
+            let (turns, sampled): (Vec<_>, Vec<_>) = turns.into_iter().unzip();
             assert_eq!(turns, expected);
+            let taken: Vec<_> = (0..9).filter(|n| sampled[*n]).collect();
+            assert_eq!((taken.len(), taken), (usize::from(samples(9)), [1, 5].to_vec()));
         }
-        watch.turn(&CONFIG());
+        watch.turn(&config());
         watch.reset();
-        assert_eq!((0..3).map(|_| watch.turn(&CONFIG())).collect::<Vec<_>>(), round);
+        assert_eq!((0..5).map(|_| watch.turn(&config())).collect::<Vec<_>>(), round);
     }
 
     /// 0.05 rad in 10 ms are 5 rad/s.

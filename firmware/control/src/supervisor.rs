@@ -10,6 +10,7 @@
 //! |---|---|---|---|---|---|---|
 //! | encoder frames, jumps | | x | x | x | x | x |
 //! | encoder stuck, tension stuck, joint speed | | | | | x | x |
+//! | open motor lead | | | | | x | x |
 //! | joint range, tracking error: position mode | | | | | | x |
 //! | tension at a rail | | x | x | x | x | x |
 //! | slack, over-tension, tensions that contradict each other or the stretch | | | | x | x | x |
@@ -200,13 +201,17 @@ impl Supervisor {
         self.rest = rest::RestLook::default();
     }
 
-    /// One tick of the present state: goes on to the next one, or finds that it cannot.
+    /// One tick of the present state: goes on to the next one, or finds that it cannot. A run does not ask for the situation.
     #[inline]
-    pub fn step(&mut self, config: &SupervisorConfig, situation: &Situation) -> Option<Detection> {
+    pub fn step(
+        &mut self,
+        config: &SupervisorConfig,
+        situation: impl FnOnce() -> Situation,
+    ) -> Option<Detection> {
         self.elapsed = self.elapsed.saturating_add(1);
         match self.state {
             State::Off | State::Ready | State::Run | State::Fault => None,
-            State::SelfTest | State::PretensionCheck | State::Homing => self.look(config, situation),
+            State::SelfTest | State::PretensionCheck | State::Homing => self.look(config, &situation()),
         }
     }
 

@@ -129,6 +129,7 @@ faults! {
     22 BusOverVoltage "V" "bus voltage is too high" "check the supply; braking may feed energy back";
     23 BridgeFault "" "the bridge reports a fault and switched itself off" "look for over-temperature or a short circuit of the bridge";
     24 WindingHot "A" "the motor's winding is too hot, as its current tells" "let it cool; hold less weight, or correct motor.continuous_current and motor.winding_time";
+    25 MotorOpen "A" "no current flows through the motor, though its voltage should make one" "look for a broken or unplugged lead of the motor, then for a dead current sensor";
     30 TickOverrun "ticks" "control ticks came too late or were missed" "lower the control rate";
     31 HostSilent "s" "the host fell silent while the joint was moving" "check the cable and the program that sends references";
     32 ParameterStoreCorrupt "" "the stored parameters cannot be read" "store the parameters again; defaults are in use";

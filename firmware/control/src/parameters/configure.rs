@@ -23,6 +23,7 @@ use crate::encoder::stuck::StuckConfig;
 use crate::encoder::{CountRaw, EncoderConfig};
 use crate::impedance::ImpedanceConfig;
 use crate::motion_watch::{LOOK_S, MotionConfig};
+use crate::motor_circuit::CircuitConfig;
 use crate::observer::ObserverConfig;
 use crate::reference::shaper::ShaperLimits;
 use crate::reference::{ReferenceBounds, TorqueWindow};
@@ -33,7 +34,7 @@ use crate::supply::SupplyConfig;
 use crate::tension::TensionConfig;
 use estimates::{observer, sheath};
 use loops::{drive, position, torque, torque_gains};
-use sensors::{encoder, supply, tension};
+use sensors::{circuit, encoder, supply, tension};
 
 /// Angle of a count, rad.
 const RAD_PER_COUNT: f32 = core::f32::consts::TAU / CountRaw::PER_TURN as f32;
@@ -45,6 +46,7 @@ pub struct TickConfig {
     pub(crate) encoder: [EncoderConfig; 2],
     pub(crate) stuck: StuckConfig,
     pub(crate) motion: MotionConfig,
+    pub(crate) circuit: CircuitConfig,
     pub(crate) tension: TensionConfig,
     pub(crate) supply: SupplyConfig,
     pub(crate) input_radius: Gain<Tension, Torque>,
@@ -80,6 +82,7 @@ impl TickConfig {
             encoder: [input, joint],
             stuck,
             motion,
+            circuit,
             tension,
             supply,
             input_radius,
@@ -108,6 +111,7 @@ impl TickConfig {
         self.encoder[1] = *joint;
         self.stuck = *stuck;
         self.motion = *motion;
+        self.circuit = *circuit;
         self.tension = *tension;
         self.supply = *supply;
         self.input_radius = *input_radius;
@@ -161,6 +165,7 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
             ticks: ticks(parameters.encoder.stuck_time, period_s),
         },
         motion: motion(parameters, period_s, reach.angle),
+        circuit: circuit(parameters, period_s)?,
         tension: tension(parameters, period_s)?,
         supply: supply(parameters, period_s)?,
         input_radius: gain(parameters.pulley.input_radius, "pulley.input_radius")?,

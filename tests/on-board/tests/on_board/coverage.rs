@@ -3,13 +3,14 @@
 use bowden_link::Fault;
 
 /// Sources of the tests that provoke faults.
-const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 7] = [
     include_str!("faults.rs"),
     include_str!("failures.rs"),
     include_str!("flash.rs"),
     include_str!("parameters.rs"),
     include_str!("clock.rs"),
     include_str!("ripple_table.rs"),
+    include_str!("motor_lead.rs"),
 ];
 
 /// The test that provokes `fault`.
@@ -31,6 +32,7 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::StretchInconsistent => "tensions_that_contradict_the_stretch_are_found",
         Fault::OverCurrent => "over_current_stops_in_three_ticks",
         Fault::WindingHot => "a_hot_winding_stops",
+        Fault::MotorOpen => "an_open_motor_lead_is_named",
         Fault::BusUnderVoltage | Fault::BusOverVoltage => "a_bus_voltage_out_of_range_stops",
         Fault::BridgeFault => "a_fault_of_the_bridge_stops_at_once",
         Fault::TickOverrun => "a_late_tick_is_a_fault",

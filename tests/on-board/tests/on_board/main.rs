@@ -20,6 +20,7 @@ mod load;
 mod log;
 mod modes;
 mod monitor;
+mod motor_lead;
 mod moved_sheath;
 mod parameters;
 mod replay_control;

@@ -3,11 +3,13 @@
 use bowden_link::message::Refusal;
 use micromath::F32Ext;
 
-use super::{RAD_PER_COUNT, conflict, fitted, friction_exponent, gain, ticks};
+use super::{RAD_PER_COUNT, conflict, fitted, friction_exponent, gain, ticks, torque_constant};
 use crate::encoder::EncoderConfig;
 use crate::encoder::multi_turn::StepLimit;
+use crate::motion_watch::{LOOK_S, samples};
+use crate::motor_circuit::{CircuitConfig, RESISTANCE_FACTOR};
 use crate::parameters::Parameters;
-use crate::scale::{Code, Current, Quantity, Tension, Voltage, Weight};
+use crate::scale::{Code, Current, Quantity, Share, Tension, Voltage, Weight};
 use crate::supply::SupplyConfig;
 use crate::tension::{TensionConfig, V_PER_CODE};
 use crate::winding::WindingConfig;
@@ -88,6 +90,25 @@ pub(super) fn supply(parameters: &Parameters, period_s: f32) -> Result<SupplyCon
             of_continuous: gain(1.0 / motor.continuous_current, "motor.continuous_current")?,
             warming: Weight::low_pass(motor.winding_time, period_s),
         },
+    })
+}
+
+/// What is expected of the motor's circuit: [`crate::motor_circuit`].
+pub(super) fn circuit(parameters: &Parameters, period_s: f32) -> Result<CircuitConfig, Refusal> {
+    let (bridge, motor) = (&parameters.bridge, &parameters.motor);
+    let look_ticks = ticks(LOOK_S, period_s);
+    let back_emf = torque_constant(parameters) / (f32::from(look_ticks) * period_s);
+    let rest_a = parameters.supervisor.rest_current;
+    let none_a = rest_a + bridge.current_gain;
+    Ok(CircuitConfig {
+        per_sample: ((1_u64 << 32) / u64::from(samples(look_ticks))) as i32,
+        reversed: bridge.direction < 0.0,
+        back_emf: gain(back_emf, "motor.torque_constant")?,
+        count: Voltage::from_f32(back_emf * RAD_PER_COUNT),
+        dead_zone: Share::from_f32(parameters.correction.dead_zone.limit),
+        least: gain(1.0 / (RESISTANCE_FACTOR * motor.resistance), "motor.resistance")?,
+        none: Current::from_f32(none_a),
+        most: Current::from_f32(none_a + rest_a),
     })
 }
 
