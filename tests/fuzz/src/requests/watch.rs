@@ -286,13 +286,13 @@ impl Watch {
         if !(drive.settings.knows_motor && self.in_force.knows_motor) {
             return;
         }
+        if now_ns - self.narrowed_ns < SETTLES_NS {
+            return;
+        }
         let limit_a = self.in_force.current_a;
         let excess_a = joint.current_a.abs() - limit_a;
         let [at_rest_a, a_per_rad_s, at_most_a] = CURRENT_SLACK;
         let slack_a = (at_rest_a + a_per_rad_s * joint.omega_rad_s[0].abs()).min(at_most_a);
-        if now_ns - self.narrowed_ns < SETTLES_NS {
-            return;
-        }
         self.tally.excess_a = self.tally.excess_a.max(excess_a);
         assert!(excess_a <= slack_a, "{} A, set {limit_a} A", joint.current_a);
     }
