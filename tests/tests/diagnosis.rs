@@ -247,6 +247,23 @@ fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
     outcome.predicts_within(0.5);
 }
 
+/// A reading that sets in over 9.8 s, up to 1.95 N, beside a spring: a wrong zero takes its place where a law of that sensor has to take off as
+/// much as any law.
+#[test]
+fn a_reading_that_sets_in_is_no_wrong_zero() {
+    let plan = plans(606).into_iter().find(|plan| plan.name == "mixed/01").unwrap();
+    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
+    let found: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
+    assert_eq!(found, ["joint_spring"]);
+    let [law] = &outcome.diagnosis.laws[..] else { panic!("{:?}", outcome.diagnosis.laws) };
+    assert_eq!(law.channel.as_deref(), Some("f3_n"), "{law:?}");
+    for (name, concealed, tolerance) in [("amplitude", 1.95, 0.15), ("time_constant_s", 9.8, 0.3)] {
+        let found = law.coefficients[name].value;
+        assert!((found / concealed - 1.0).abs() < tolerance, "{name}: {found} for {concealed}");
+    }
+    outcome.predicts_within(0.5);
+}
+
 /// On this bench, whose tensions are noisy and whose parameters are wrong, an effect comes near the bar of the search, beside what
 /// is ordinary and at its resolution, and takes less than a hundredth off the loss of the rig that is written.
 #[test]
