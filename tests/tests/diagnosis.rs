@@ -264,6 +264,17 @@ fn a_reading_that_sets_in_is_no_wrong_zero() {
     outcome.predicts_within(0.5);
 }
 
+/// Dry friction of the joint, a friction that prefers a direction and a wrong zero: none is worth its name alone, each is beside the others.
+#[test]
+fn what_is_worth_little_alone_is_found_beside_the_rest() {
+    let plan = plans(606).into_iter().find(|plan| plan.name == "triple/00").unwrap();
+    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
+    let mut found: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
+    found.sort_unstable();
+    assert_eq!(found, ["asymmetric_friction", "joint_coulomb_friction", "sensor_offset"]);
+    outcome.predicts_within(0.5);
+}
+
 /// On this bench, whose tensions are noisy and whose parameters are wrong, an effect comes near the bar of the search, beside what
 /// is ordinary and at its resolution, and takes less than a hundredth off the loss of the rig that is written.
 #[test]

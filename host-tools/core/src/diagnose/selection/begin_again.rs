@@ -1,7 +1,8 @@
-//! A search that begins with another name: where much is left although names were found, the first of them may have been the wrong one to
-//! begin with. Friction with the square of a load is worth little before the dry friction beside it is known, and the other way round.
+//! A search that begins with another name: where much is left, the first of the names may have been the wrong one to begin with, and where
+//! none was found, each may be worth little before the others are known. Friction with the square of a load is, before the dry friction
+//! beside it is known, and the other way round.
 
-use super::{Chosen, Fitted, Round, Search, Tried, handicap};
+use super::{Attempted, Chosen, Fitted, PROMISING, Round, Search, Tried, handicap};
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -9,9 +10,13 @@ use crate::outcome::Failure;
 /// Most rivals of the first name with which a search begins again.
 const RIVALS: usize = 4;
 
+/// The same where no name was found.
+const BEGINNINGS: usize = 3;
+
 impl Search<'_> {
     /// Where the names leave more than [`Policy::much_left`](crate::diagnose::policy::Policy::much_left), searches again with each of the best
-    /// rivals of the first in its place, and keeps what is worth a name more than what is there. `nothing` is the fit without any.
+    /// rivals of the first in its place, and keeps what is worth a name more than what is there. Where no name was found, with each of the
+    /// best of the first round; what is found then is worth its place beside the others, though not alone. `nothing` is the fit without any.
     pub(super) fn begin_again(
         &self,
         nothing: &Fitted,
@@ -19,12 +24,18 @@ impl Search<'_> {
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
     ) -> Result<(), Failure> {
-        let Some(first) = chosen.first().filter(|_| present.loss > POLICY.much_left).cloned() else {
+        if present.loss <= POLICY.much_left {
             return Ok(());
+        }
+        let (rivals, most, own) = match chosen.first() {
+            Some(first) => {
+                let own = Tried { effect: first.effect, model: first.model.clone(), loss: first.loss_after };
+                (first.others.clone(), RIVALS, Some(own))
+            }
+            None => (beginnings(nothing, rounds), BEGINNINGS, None),
         };
-        let own = Tried { effect: first.effect, model: first.model.clone(), loss: first.loss_after };
         let mut best: Option<(Fitted, Vec<Chosen>)> = None;
-        for (place, rival) in first.others.iter().take(RIVALS).enumerate() {
+        for (place, rival) in rivals.iter().take(most).enumerate() {
             if self.progress.interrupted() {
                 return Ok(());
             }
@@ -33,9 +44,9 @@ impl Search<'_> {
             if !self.is_no_parameter(nothing, &other, other.newest_place())? {
                 continue;
             }
-            let rest = first.others.iter().enumerate().filter(|(other, _)| *other != place);
+            let rest = rivals.iter().enumerate().filter(|(other, _)| *other != place);
             let mut others: Vec<Tried> = rest.map(|(_, tried)| tried.clone()).collect();
-            others.push(own.clone());
+            others.extend(own.clone());
             others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
             let mut others_chosen = vec![Chosen {
                 effect: other.newest(),
@@ -51,6 +62,7 @@ impl Search<'_> {
             }
         }
         if let Some((other, others_chosen)) = best
+            && !others_chosen.is_empty()
             && self.is_better((present, chosen), (&other, &others_chosen))?
         {
             (*present, *chosen) = (other, others_chosen);
@@ -59,20 +71,36 @@ impl Search<'_> {
     }
 
     /// Whether other names are to take the place of those that are there. Each of either is worth its place beside the others of its own.
-    /// Where recordings can judge one another those that predict better do; where they cannot, the others have to be worth a name more.
+    /// Where recordings can judge one another those that predict better do; where they cannot, or where nothing is there yet, the others have
+    /// to be worth a name more.
     fn is_better(
         &self,
         (present, chosen): (&Fitted, &[Chosen]),
         (other, others_chosen): (&Fitted, &[Chosen]),
     ) -> Result<bool, Failure> {
-        if !self.recordings_judge_one_another() {
+        if chosen.is_empty() || !self.recordings_judge_one_another() {
             let is_worth = |without, with| POLICY.worth_naming(without, with);
-            return Ok(other.shows(present, &other.newest(), is_worth));
+            return Ok(other.shows(present, &other.newest(), is_worth)
+                && self.holds_across_recordings(present, other, is_worth)?);
         }
         let [here, there] = [chosen, others_chosen].map(handicap_of_all);
         let better = |loss: f64, others_loss: f64| there * others_loss < here * loss;
         Ok(better(present.loss, other.loss) && self.holds_across_recordings(present, other, better)?)
     }
+}
+
+/// The candidates of the first round that were fitted and take off what a name must promise, best first.
+fn beginnings(nothing: &Fitted, rounds: &[Round]) -> Vec<Tried> {
+    let Some(first) = rounds.first() else { return Vec::new() };
+    let fitted = |attempted: &Attempted| {
+        let loss = attempted.loss.filter(|loss| *loss < (1.0 - PROMISING) * first.loss_before)?;
+        let (layout, with) = nothing.layout.with(&nothing.solution.model, attempted.effect);
+        Some(Tried { effect: attempted.effect, model: layout.without_ordinary(&with), loss })
+    };
+    let mut all: Vec<Tried> = first.candidates.iter().filter_map(fitted).collect();
+    let handicapped = |tried: &Tried| tried.loss * handicap(&tried.effect);
+    all.sort_by(|a, b| handicapped(a).total_cmp(&handicapped(b)));
+    all
 }
 
 /// Factor of the loss with several effects, where they are compared with others.
