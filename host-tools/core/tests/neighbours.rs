@@ -1,11 +1,13 @@
-//! Models that others wrote as rigs, line by line, and rigs out to MuJoCo. That MuJoCo itself comes to the same numbers, and loads what is
-//! written, is tested in Python.
+//! Models that others wrote as rigs, line by line, rigs out to MuJoCo, and a ROS 2 bag that others wrote as a recording. That MuJoCo itself comes
+//! to the same numbers, and loads what is written, is tested in Python.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use bowden_core::neighbours::{from_mjcf, from_urdf, into_mjcf, to_mjcf};
+use bowden_core::recording::{ReadOptions, Recording};
 use bowden_core::rig::{Rig, RigDocument};
+use bowden_model::channel::Channel;
 use bowden_model::load::GRAVITY_M_S2;
 
 fn model(name: &str) -> PathBuf {
@@ -213,4 +215,28 @@ fn what_cannot_be_read_is_refused_with_its_line() {
     assert!(refusal(circle, "a", true).contains("circle"));
     let slide = body("<joint name=\"s\" type=\"slide\"/>");
     assert!(refusal(&slide, "s", false).contains("type slide"));
+}
+
+/// Joint states among 94 types of messages, two each; numbers as the script that wrote them has them, times as another library reads them.
+#[test]
+fn a_bag_of_somebody_else_is_a_recording() {
+    let columns = r#"
+        [recording.columns]
+        theta_in_rad = { column = "/test/sensor_msgs/joint_state:joint1.position" }
+        theta_out_rad = { column = "/test/sensor_msgs/joint_state:joint2.position", scale = -2.0 }
+        i_motor_a = { column = "/test/sensor_msgs/joint_state:joint3.effort" }"#;
+    let rig = Rig::parse(&format!("{BENCH}{columns}"), "rig.toml").unwrap();
+    let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bags/rosbags-rs.mcap");
+    // A rig asks for fifty samples; the bag has two.
+    let recording = Recording::load(&bag, &ReadOptions { columns: rig.columns, only: None }).unwrap();
+    let seconds = 1_749_315_325.013_567_488_f64 - 1_749_315_324.955_078_144;
+    assert_eq!(recording.t_s().len(), 2);
+    assert!(
+        recording.t_s()[0] == 0.0 && (recording.t_s()[1] - seconds).abs() < 1e-6,
+        "{:?}",
+        recording.t_s()
+    );
+    assert_eq!(recording.channel(Channel::ThetaIn).unwrap(), [0.1, 0.1]);
+    assert_eq!(recording.channel(Channel::ThetaOut).unwrap(), [-0.4, -0.4]);
+    assert_eq!(recording.channel(Channel::MotorCurrent).unwrap(), [3.0, 3.0]);
 }
