@@ -44,6 +44,8 @@ const BATCH: Duration = Duration::from_nanos(PERIOD_NS * BATCH_LENGTH as u64);
 pub struct Terminal {
     fake: Arc<Mutex<Fake>>,
     stop: Arc<AtomicBool>,
+    /// Stopped within a frame.
+    within: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     port: String,
     /// Other name of the port, which stays when it is plugged in again.
@@ -78,9 +80,16 @@ impl Terminal {
         fcntl_setfl(&master, OFlags::NONBLOCK).unwrap();
 
         let stop = Arc::new(AtomicBool::new(false));
-        let (shared, stopped) = (Arc::clone(&fake), Arc::clone(&stop));
-        let thread = std::thread::spawn(move || serve(&mut File::from(master), &shared, &stopped));
-        Self { fake, stop, thread: Some(thread), port, link: None, _slave: slave }
+        let within = Arc::new(AtomicBool::new(false));
+        let (shared, stopped, cut) = (Arc::clone(&fake), Arc::clone(&stop), Arc::clone(&within));
+        let thread = std::thread::spawn(move || {
+            let mut master = File::from(master);
+            let unsent = serve(&mut master, &shared, &stopped);
+            if cut.load(Ordering::Relaxed) {
+                send_without_its_end(&mut master, &shared, unsent);
+            }
+        });
+        Self { fake, stop, within, thread: Some(thread), port, link: None, _slave: slave }
     }
 
     pub fn port(&self) -> &str {
@@ -106,6 +115,12 @@ impl Terminal {
     pub fn start_recording(&self, folder: &Path, out: &str) -> Child {
         let mut command = self.command(folder, "record", &["--out", out]);
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    }
+
+    /// Pulls the plug while a frame is on its way: its last bytes do not arrive.
+    pub fn unplug_within_a_frame(&mut self) {
+        self.within.store(true, Ordering::Relaxed);
+        self.unplug();
     }
 
     /// Pulls the plug.
@@ -137,8 +152,8 @@ impl Drop for Terminal {
     }
 }
 
-/// Moves bytes between terminal and board, and the board's clock as far as its host allows, until told to stop.
-fn serve(master: &mut File, fake: &Mutex<Fake>, stop: &AtomicBool) {
+/// Moves bytes between terminal and board, and the board's clock as far as its host allows, until told to stop; returns what is not sent.
+fn serve(master: &mut File, fake: &Mutex<Fake>, stop: &AtomicBool) -> Vec<u8> {
     let mut buffer = [0; 4096];
     let mut unsent = Vec::new();
     let mut allowed_until = Duration::ZERO;
@@ -168,6 +183,29 @@ fn serve(master: &mut File, fake: &Mutex<Fake>, stop: &AtomicBool) {
             let room = if unsent.is_empty() { PollFlags::empty() } else { PollFlags::OUT };
             // Without an event, or with an interrupted wait, the loop looks again.
             let _ = poll(&mut [PollFd::new(master, PollFlags::IN | room)], Some(&WAKE));
+        }
+    }
+    unsent
+}
+
+/// Sends what is unsent and a batch of samples, but for the last bytes.
+fn send_without_its_end(master: &mut File, fake: &Mutex<Fake>, mut unsent: Vec<u8>) {
+    /// The end of a frame, and two bytes of what it holds.
+    const MISSING: usize = 3;
+    {
+        let mut fake = fake.lock().unwrap();
+        let now = fake.now();
+        fake.advance_to(now + BATCH);
+        unsent.extend(fake.take());
+    }
+    assert_eq!(unsent.last(), Some(&0), "no frame to cut");
+    unsent.truncate(unsent.len() - MISSING);
+    assert_ne!(unsent.last(), Some(&0), "the cut is within no frame");
+    while !unsent.is_empty() {
+        let sent = master.write(&unsent).unwrap_or(0);
+        unsent.drain(..sent);
+        if sent == 0 {
+            let _ = poll(&mut [PollFd::new(master, PollFlags::OUT)], Some(&WAKE));
         }
     }
 }

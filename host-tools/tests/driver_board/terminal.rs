@@ -365,25 +365,30 @@ fn ctrl_c_ends_a_recording_whole() {
     assert!(holds("bowden.parameters") && holds("tendon.pretension") && holds("9.8.7"));
 }
 
+/// Between two frames, and within one, of which nothing is kept and nothing is said.
 #[test]
 fn a_pulled_plug_keeps_the_rows_before_it() {
-    let mut terminal = Terminal::new(Fake::new(Mishaps::default()));
-    let folder = tempfile::tempdir().unwrap();
-    let port = terminal.port().to_owned();
-    let mut command = terminal.command(folder.path(), "record", &["--out", "a.csv", "--replug", "0"]);
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    wait_for_bytes(THOUSAND_ROWS, folder.path(), &mut child);
-    terminal.unplug();
-    let (status, _, stderr) = result_of(&child.wait_with_output().unwrap());
-    let rows = load(folder.path(), "a.csv").len();
-    assert_eq!(status, 1);
-    assert!(rows > 1000, "{rows} rows");
-    assert!(stderr.starts_with(&format!("bowden: {port}: ")), "{stderr}");
-    assert!(
-        stderr.contains(&format!("check cable and supply, then connect again; a.csv: {rows} rows over ")),
-        "{stderr}"
-    );
-    assert_eq!(stderr.lines().count(), 1);
+    for pull in [Terminal::unplug, Terminal::unplug_within_a_frame] {
+        let mut terminal = Terminal::new(Fake::new(Mishaps::default()));
+        let folder = tempfile::tempdir().unwrap();
+        let port = terminal.port().to_owned();
+        let mut command = terminal.command(folder.path(), "record", &["--out", "a.csv", "--replug", "0"]);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        wait_for_bytes(THOUSAND_ROWS, folder.path(), &mut child);
+        pull(&mut terminal);
+        let (status, _, stderr) = result_of(&child.wait_with_output().unwrap());
+        let recording = load(folder.path(), "a.csv");
+        let rows = recording.len();
+        assert_eq!(status, 1);
+        assert!(rows > 1000, "{rows} rows");
+        assert!(ticks(&recording).windows(2).all(|pair| pair[1] == pair[0] + 1));
+        assert!(stderr.starts_with(&format!("bowden: {port}: ")), "{stderr}");
+        assert!(
+            stderr.contains(&format!("check cable and supply, then connect again; a.csv: {rows} rows over ")),
+            "{stderr}"
+        );
+        assert_eq!(stderr.lines().count(), 1);
+    }
 }
 
 #[test]
