@@ -1,47 +1,44 @@
-//! When something is said: the numbers by which losses become names, laws, odds and a verdict.
+//! Thresholds of the diagnosis: which reduction of the loss is enough to name an effect, to state a law, to report either.
 //!
-//! They stand in every `diagnosis.json`, so that a reader can hold the losses there against them. A loss is in squared scales: 1 where
-//! every residual is what sensor noise and an ordinary bench leave.
+//! Every `diagnosis.json` repeats them next to the losses they were applied to. The loss is the mean squared residual in units of the noise
+//! scale: 1 means that sensor noise and the tolerances of an ordinary bench explain all of it.
 
 use serde::{Deserialize, Serialize};
 
-/// The numbers.
+/// Thresholds on losses and probabilities.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Policy {
-    /// Share of the loss that an effect must remove to be named: what two realities differ by is not all ordinary contact and
-    /// friction, and effects that imitate the rest remove a part of it.
+    /// Minimum relative reduction of the loss for an effect to be named. The model differs from any real bench in more than the catalogue
+    /// holds, and an effect that only imitates that difference reduces the loss by a smaller share.
     pub name_share: f64,
-    /// Loss that an effect must remove whatever the share. On fifty virtual benches that hide nothing (`prove`, groups `nothing` and
-    /// `parameters`) candidates remove up to 0.04, as `search` in their `diagnosis.json` tells, but for friction of the sheath that falls
-    /// at a crawl (`sheath_stribeck_friction`), up to 0.27, and for one bench, up to 0.20, where the rig that would be written does not
-    /// gain by it.
+    /// Minimum absolute reduction of the loss for an effect to be named. On fifty virtual benches without a concealed effect (`prove`, groups
+    /// `nothing` and `parameters`) candidates reduce it by up to 0.04 (`search` in each `diagnosis.json`), with two exceptions:
+    /// `sheath_stribeck_friction`, up to 0.27, and one bench, up to 0.20, whose diagnosed rig would not fit better.
     pub name_loss: f64,
-    /// Loss from which on more is left than noise and an ordinary bench leave: every residual beyond the three scales at which the loss
-    /// bends.
+    /// Loss above which the residual is far beyond noise and bench tolerances: every residual is beyond the three noise scales at which the
+    /// loss function changes from quadratic to linear.
     pub much_left: f64,
-    /// Advantage in loss that each further parameter must earn between two candidates.
+    /// Relative reduction of the loss that each further parameter of a candidate must achieve in a comparison.
     pub share_per_parameter: f64,
-    /// Share of the loss that a law must remove. It is chosen among many forms with up to three coefficients each, so that more
-    /// of what two realities differ by is imitated by one of them than by a name.
+    /// Minimum relative reduction of the loss for a law to be stated. A law is selected from many forms with up to three coefficients, so
+    /// that it imitates a model error more easily than a named effect does.
     pub law_share: f64,
-    /// Loss that a law must remove whatever the share: where less than that is left no law is looked for.
+    /// Minimum absolute reduction of the loss for a law to be stated; below this loss no law is searched for.
     pub law_loss: f64,
-    /// Share of the loss of the recalibrated rig that the diagnosed one must take off, for what was found to be said
-    /// (`training_loss` in each `diagnosis.json`): far below it lies what imitates the rest of an ordinary bench, above it what
-    /// is there.
+    /// Minimum relative reduction of the training loss, from the recalibrated to the diagnosed rig, before any effect is reported
+    /// (`training_loss` in each `diagnosis.json`). Effects that imitate bench tolerances stay far below it.
     pub paying_share: f64,
-    /// Standard deviations by which a wrong parameter is off at least.
+    /// Minimum deviation of a parameter from the rig file, in standard deviations, for it to be reported as wrong.
     pub sure_stds: f64,
-    /// Sharpness with which a ratio of losses turns into odds: at 10 a candidate that leaves a fifth more is six times less
-    /// likely.
+    /// Exponent that turns a ratio of losses into odds: at 10, a candidate whose loss is 20 % higher is six times less likely.
     pub odds_per_loss_ratio: f64,
-    /// Odds below which a rival is not listed.
+    /// Minimum odds for a rival to be listed.
     pub listed_odds: f64,
-    /// Improvement at which an effect is as likely as not.
+    /// Relative improvement at which the probability that an effect exists is 50 %.
     pub even_improvement: f64,
 }
 
-/// The policy of every diagnosis.
+/// Thresholds that every diagnosis uses.
 pub const POLICY: Policy = Policy {
     name_share: 0.15,
     name_loss: 0.1,
@@ -57,58 +54,58 @@ pub const POLICY: Policy = Policy {
 };
 
 impl Policy {
-    /// Whether an effect that brings the loss from `before` to `after` is worth naming.
+    /// Whether an effect that reduces the loss from `before` to `after` is named.
     ///
-    /// Where what is left stands far above what an ordinary bench leaves, other physics is missing too, and what takes a little off may
-    /// only imitate it: every factor of a hundred beyond `much_left` asks for `name_share` more.
+    /// A remaining loss above [`much_left`](Self::much_left) means that other physics is missing as well, which a small reduction may only
+    /// imitate: each factor of 100 above it raises the required share by `name_share`.
     #[must_use]
     pub fn worth_naming(&self, before: f64, after: f64) -> bool {
         let share = self.name_share * (1.0 + 0.5 * (after / self.much_left).log10().max(0.0));
         before - after > self.name_loss && before - after > share * before
     }
 
-    /// Whether an effect is worth naming that its own channel does not tell from a parameter: it takes off the share of a law too.
+    /// The same for an error of a sensor that its own channel cannot distinguish from a change of parameters: it must reach the share of a
+    /// law.
     #[must_use]
     pub fn worth_naming_untold(&self, before: f64, after: f64) -> bool {
         self.worth_naming(before, after) && before - after > self.law_share * before
     }
 
-    /// Whether an effect that is worth its name shows where it takes least off, too: what limits a reading or stops a joint is idle most of
-    /// the time, and other physics that is missing hides all but a little of it there. Where more than `much_left` is left that little is
-    /// more likely an imitation, and is not taken for it.
+    /// Whether a named effect also reduces the loss where it acts least. A saturated sensor or an end stop is inactive most of the time, so
+    /// that a small reduction is enough there; with a remaining loss above `much_left` it is not, because it may be an imitation.
     #[must_use]
     pub fn shows_elsewhere(&self, before: f64, after: f64) -> bool {
         before - after > self.name_loss && self.pays(before, after) && after <= self.much_left
     }
 
-    /// Whether so many further instances of an effect that has its name are worth having.
+    /// Whether `instances` further instances of a named effect, such as harmonics of cogging, are kept.
     #[must_use]
     pub fn worth_having(&self, before: f64, after: f64, instances: usize) -> bool {
         before - after > self.name_loss
             && before - after > self.share_per_parameter * instances as f64 * before
     }
 
-    /// Whether a law is worth stating.
+    /// Whether a law that reduces the loss from `before` to `after` is stated.
     #[must_use]
     pub fn worth_stating(&self, before: f64, after: f64) -> bool {
         before - after > self.law_loss && before - after > self.law_share * before
     }
 
-    /// Whether the diagnosed rig, which stands without what is ordinary, fits better than the recalibrated one.
+    /// Whether the diagnosed rig, written without nuisance terms, fits better than the recalibrated one.
     #[must_use]
     pub fn pays(&self, recalibrated: f64, diagnosed: f64) -> bool {
         recalibrated - diagnosed > self.paying_share * recalibrated
     }
 
-    /// Factor of the loss with an effect, where candidates are compared: its parameters count, and a form that is not the usual one
-    /// must be worth its choice as a name must.
+    /// Factor on the loss of a candidate in comparisons: it grows with the number of parameters, and by `name_share` for a form that is not
+    /// the usual one.
     #[must_use]
     pub fn handicap(&self, parameters: usize, is_usual_form: bool) -> f64 {
         let share = if is_usual_form { 0.0 } else { self.name_share };
         (1.0 + self.share_per_parameter * parameters as f64) / (1.0 - share)
     }
 
-    /// Odds of a candidate whose loss is so many times that of the named effect.
+    /// Odds of a candidate whose loss is `loss_ratio` times that of the named effect.
     #[must_use]
     pub fn odds(&self, loss_ratio: f64) -> f64 {
         loss_ratio.powf(-self.odds_per_loss_ratio)
@@ -120,7 +117,7 @@ impl Policy {
         odds > self.listed_odds
     }
 
-    /// Probability that anything is there at all which takes so much off the loss.
+    /// Probability that an effect with this relative improvement exists at all.
     #[must_use]
     pub fn presence(&self, improvement: f64) -> f64 {
         1.0 - 0.5 * (-(improvement - self.even_improvement).max(0.0) / self.even_improvement).exp()

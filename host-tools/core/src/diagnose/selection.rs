@@ -1,11 +1,11 @@
-//! Which effects the data ask for: forward, the best candidate at a time, by what it takes off the loss of all that is fitted; then
-//! backward, each effect must still be worth its place beside what every bench has a little of.
+//! Selection of effects: forward, one effect at a time by its reduction of the training loss, then backward, where each effect must still
+//! reduce the loss by its threshold with all others and the nuisance terms present.
 //!
-//! A wrong sensor whose own channel changes as some parameter changes it must take off the share that a law must.
+//! The error of a sensor that a change of parameters could cause as well must reach the threshold of a law.
 //!
-//! What is held out takes no part. That a fit sees what it is chosen by costs little: an effect has two or three parameters, and of
-//! hundreds of residuals that know nothing of each other they take off a hundredth, where a name must take off 15 % and a law 30 %
-//! ([`POLICY`]), a law also without the tenth of the seconds that speak most for it, where a name must show.
+//! Held-out data take no part. Selecting on the training data biases the result little: an effect has two or three parameters, which by
+//! chance reduce the loss of several hundred independent residuals by about 1 %, whereas an effect must reduce it by 15 % and a law by 30 %
+//! ([`POLICY`]); a law must do so also without the tenth of the seconds that support it most.
 
 mod across;
 mod begin_again;
@@ -37,68 +37,68 @@ use crate::progress::Progress;
 pub use hypotheses::{BestRival, Trial};
 use loudest::without_the_loudest;
 
-/// Candidates whose fit is brought to an end, of those that fit best so far.
+/// Number of candidates that are fitted to convergence.
 const FINALISTS: usize = 3;
 
-/// Estimated gain below which a candidate is not fitted.
+/// Minimum estimated relative reduction of the loss for a candidate to be fitted.
 const PROMISING: f64 = 0.08;
 
-/// Most effects that are named at once.
+/// Maximum number of named effects.
 const MOST_EFFECTS: usize = 6;
 
 /// Optimiser evaluations per parameter and round.
 const PATIENCE: usize = 5;
 
-/// A candidate that was fitted.
+/// A fitted candidate.
 #[derive(Clone, Debug)]
 pub struct Tried {
-    /// The effect as it was fitted.
+    /// The fitted effect.
     pub effect: ActiveEffect,
-    /// Model with it.
+    /// Model with the effect.
     pub model: JointModel,
-    /// Loss with it.
+    /// Loss of that model.
     pub loss: f64,
 }
 
-/// One round of the search: what was tried beside what was there already.
+/// One round of the search.
 #[derive(Clone, Debug)]
 pub struct Round {
-    /// Loss before it.
+    /// Loss before the round.
     pub loss_before: f64,
-    /// Candidates, most promising first.
+    /// Candidates in the order of screening.
     pub candidates: Vec<Attempted>,
 }
 
 /// A candidate of a round.
 #[derive(Clone, Copy, Debug)]
 pub struct Attempted {
-    /// The effect where it was left.
+    /// The effect with its last parameters.
     pub effect: ActiveEffect,
-    /// Share of the fitted loss that screening promised.
+    /// Relative reduction of the loss estimated by screening.
     pub promised: f64,
-    /// Loss of one that was fitted.
+    /// Loss after the fit; `None` if the candidate was not fitted.
     pub loss: Option<f64>,
 }
 
-/// One effect that was chosen.
+/// One selected effect.
 #[derive(Clone, Debug)]
 pub struct Chosen {
-    /// The effect, with its target, as it was first fitted.
+    /// The effect and its target, as fitted when it was selected.
     pub effect: ActiveEffect,
-    /// Model with it, as it was first fitted.
+    /// Model with the effect, from the same fit.
     pub model: JointModel,
-    /// Loss before it was added.
+    /// Loss without the effect.
     pub loss_before: f64,
-    /// Loss with it.
+    /// Loss with the effect.
     pub loss_after: f64,
-    /// The models of these losses, with what is ordinary.
+    /// The models of these two losses, with nuisance terms.
     pub compared: [JointModel; 2],
     /// Other candidates of the same round, best first.
     pub others: Vec<Tried>,
 }
 
 impl Chosen {
-    /// Another effect in its place, which is no rival of itself then.
+    /// Replaces the effect by `other` and removes that from its rivals.
     fn becomes(&mut self, other: ActiveEffect) {
         self.others.retain(|tried| !tried.effect.is_beside(&other));
         for model in [&mut self.model, &mut self.compared[1]] {
@@ -107,7 +107,7 @@ impl Chosen {
         self.effect = other;
     }
 
-    /// Its worth beside all that was found; rivals keep their odds.
+    /// Updates the losses to those with all other effects present; rivals keep their odds.
     fn stands(&mut self, before: &Fitted, after: &Fitted) {
         for tried in &mut self.others {
             tried.loss *= after.loss / self.loss_after;
@@ -120,28 +120,28 @@ impl Chosen {
 /// Result of the selection.
 #[derive(Clone, Debug)]
 pub struct Selected {
-    /// Model with nominal parameters recalibrated, without any new effect.
+    /// Model with recalibrated nominal parameters and no new effect.
     pub baseline: Solution,
-    /// The same with what is ordinary.
+    /// The same with nuisance terms.
     pub plain: JointModel,
-    /// Model that the search ended with: all chosen effects and what is ordinary.
+    /// Final model of the search: all selected effects and the nuisance terms.
     pub searched: JointModel,
-    /// What is ordinary, as it was last fitted.
+    /// Nuisance terms from the last fit.
     pub ordinary: Vec<ActiveEffect>,
-    /// Model with all chosen effects, as they were last fitted.
+    /// Model with all selected effects from the last fit, without nuisance terms.
     pub model: JointModel,
-    /// Chosen effects in the order of the model's new effects.
+    /// Selected effects in the order of the model's new effects.
     pub chosen: Vec<Chosen>,
-    /// What was tried.
+    /// Rounds of the search.
     pub rounds: Vec<Round>,
-    /// Every hypothesis of the user by itself.
+    /// Fits of the user's hypotheses.
     pub trials: Vec<Trial>,
-    /// Whether the search came to its end.
+    /// Whether the search was completed.
     pub complete: bool,
 }
 
 impl Selected {
-    /// The same search with nothing found.
+    /// The same search with all effects withdrawn.
     #[must_use]
     pub fn withdrawn(self) -> Self {
         let ordinary = self.plain.effects[self.baseline.model.effects.len()..].to_vec();
@@ -154,11 +154,11 @@ impl Selected {
         }
     }
 
-    /// The same search without the chosen effects of which hardly anything is left in `fitted`, the chosen ones fitted to
-    /// `objective` at the rig's own resolution; `None` where all are there. What is left as another effect takes the place of the one.
+    /// The same search without the effects that are negligible in `fitted`, the fit to `objective` at the rig's own resolution; `None` if
+    /// none is. An effect whose remainder is another effect of the catalogue is replaced by that.
     ///
-    /// The search simulates coarsely, and an effect may make up for that alone: a spring of a few thousandths of a newton metre a
-    /// radian had ten times that strength there.
+    /// The search simulates coarsely, and an effect may only compensate the discretisation error: a spring of a few mN·m/rad was ten times as
+    /// strong there.
     #[must_use]
     pub fn without_faded(&self, objective: &Objective, fitted: &JointModel) -> Option<Self> {
         let believed = &self.baseline.model;
@@ -182,7 +182,7 @@ impl Selected {
     }
 }
 
-/// Finds the effects that the recordings ask for.
+/// Selects the effects that explain the recordings.
 ///
 /// # Errors
 /// When the model cannot be driven.
@@ -204,7 +204,7 @@ pub fn select(
     }
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
     let trials = search.trials(&nothing)?;
-    // What was found as well is nothing that it could be instead.
+    // An effect that was selected as well is not a rival.
     let found: Vec<ActiveEffect> = chosen.iter().map(|one| one.effect).collect();
     for one in &mut chosen {
         one.others.retain(|tried| !found.iter().any(|found| found.is_beside(&tried.effect)));
@@ -225,23 +225,23 @@ pub fn select(
     })
 }
 
-/// Losses of a round in which an ordinary effect may have been left out, because it had grown as large as it may be.
+/// Losses of a round in which a nuisance term at its upper bound was left out.
 #[derive(Clone, Copy)]
 struct Losses {
-    /// Without it, before the round.
+    /// Without the nuisance term, before the round.
     before: f64,
-    /// Without it, with the candidate.
+    /// Without the nuisance term, with the candidate.
     with: f64,
-    /// With it, before the round.
+    /// With the nuisance term, before the round.
     ordinary: f64,
-    /// With it and the candidate.
+    /// With the nuisance term and the candidate.
     with_both: f64,
 }
 
-/// Whether what brings the loss from one value to another is worth it.
+/// Threshold: whether a reduction of the loss from one value to another is sufficient.
 type Worth = fn(&Policy, f64, f64) -> bool;
 
-/// What a round tries.
+/// Kind of candidates of a round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// Effects of the catalogue.
@@ -251,8 +251,8 @@ enum Kind {
 }
 
 impl Losses {
-    /// Whether the candidate is found: it is worth it, and either does better than the ordinary in its place or is worth it
-    /// beside that.
+    /// Whether the candidate is selected: it reaches the threshold, and either fits better than the nuisance term or reaches the threshold
+    /// in addition to it.
     fn found(self, worth: Worth) -> bool {
         worth(&POLICY, self.before, self.with)
             && (self.replaces_ordinary() || worth(&POLICY, self.ordinary, self.with_both))
@@ -263,21 +263,21 @@ impl Losses {
     }
 }
 
-/// A fitted model, whose effects are whose, and how well it fits.
+/// A fitted model, the origin of each of its effects, and its losses.
 #[derive(Clone)]
 struct Fitted {
     layout: Layout,
     solution: Solution,
     loss: f64,
     stretch_losses: StretchLosses,
-    /// Whether it was fitted to the end, and not just as far as a ranking needs.
+    /// Whether the fit converged; otherwise it is sufficient for ranking only.
     finished: bool,
-    /// Whether the effect that was added last is a moment that no recording shows.
+    /// Whether the newest effect begins at a moment that no recording covers.
     unseen: bool,
 }
 
 impl Fitted {
-    /// Place, among the model's effects, of the one that was added last.
+    /// Index of the effect that was added last.
     fn newest_place(&self) -> usize {
         self.solution.model.effects.len() - 1
     }
@@ -291,14 +291,14 @@ impl Fitted {
         self.layout.without_ordinary(&self.solution.model)
     }
 
-    /// The model without the found effects in these places, which rise.
+    /// The model without the effects at these indices, in ascending order.
     fn without(&self, places: &[usize]) -> (Layout, JointModel) {
         let all = (self.layout.clone(), self.solution.model.clone());
         places.iter().rev().fold(all, |(layout, model), place| layout.without(&model, *place))
     }
 
-    /// Whether `effect`, which `before` lacks, is worth its place, and shows also without what speaks most for it: an effect of the
-    /// catalogue at all, a law by as much again, for one of many forms fits a few moments.
+    /// Whether `effect`, which `before` lacks, reaches the threshold `worth`, and is visible also without the data that support it most: an
+    /// effect of the catalogue at all, a law by the same threshold, because one of its many forms can fit a few moments by chance.
     fn shows(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
         let is_law = law::of(effect).is_some();
         let elsewhere = |[without, with]: &[f64; 2]| {
@@ -308,7 +308,7 @@ impl Fitted {
         worth(before.loss, self.loss) && quieter.iter().all(elsewhere)
     }
 
-    /// Loss with the advantage that simpler effects get.
+    /// Loss times the factor that favours simpler effects.
     fn handicapped(&self) -> f64 {
         self.loss * handicap(&self.newest())
     }
@@ -317,24 +317,24 @@ impl Fitted {
         self.handicapped().total_cmp(&other.handicapped())
     }
 
-    /// What is told of it as a candidate.
+    /// Its record as a candidate.
     fn tried(&self, loss: f64) -> Tried {
         Tried { effect: self.newest(), model: self.without_ordinary(), loss }
     }
 }
 
-/// What all steps of a search share.
+/// Inputs that all steps of a search share.
 struct Search<'a> {
     objective: &'a Objective,
-    /// What the rig states.
+    /// Model of the rig file.
     believed: &'a JointModel,
-    /// What is tried beside what always is.
+    /// Effects and hypotheses that the user asked for.
     asked: &'a Asked<'a>,
     progress: &'a dyn Progress,
 }
 
 impl Search<'_> {
-    /// The recalibrated model, and the same with what is ordinary, where there may be one.
+    /// The recalibrated model, and the same with nuisance terms if the rig allows any.
     fn baseline(&self) -> Result<(Solution, Fitted), Failure> {
         self.progress.stage("recalibrating", 0);
         let plain = self.fit(Layout::of(self.believed), self.believed, &[COARSE_STEP, FINE_STEP])?;
@@ -342,7 +342,7 @@ impl Search<'_> {
         Ok((baseline, self.with_ordinary(plain)?))
     }
 
-    /// Adds name after name while one is worth it, and takes out those that later ones have made superfluous.
+    /// Adds effects one by one while one reaches the threshold, and removes those that later ones make superfluous.
     fn add_names(
         &self,
         present: &mut Fitted,
@@ -364,7 +364,7 @@ impl Search<'_> {
         if self.progress.interrupted() { Ok(()) } else { self.prune(present, chosen) }
     }
 
-    /// `present`, fitted without the ordinary effects that are as large as they may be.
+    /// `present`, refitted without the nuisance terms that are at their upper bound.
     fn without_exhausted(&self, present: &Fitted) -> Result<Fitted, Failure> {
         match present.layout.without_exhausted(self.believed, &present.solution.model) {
             Some((layout, without)) => self.fit(layout, &without, &[COARSE_STEP, FINE_STEP]),
@@ -372,7 +372,7 @@ impl Search<'_> {
         }
     }
 
-    /// `present` with what is ordinary beside what was found.
+    /// `present` with the nuisance terms in addition to the selected effects.
     fn with_ordinary(&self, present: Fitted) -> Result<Fitted, Failure> {
         let (layout, with) = present.layout.with_ordinary(&present.solution.model);
         if layout == present.layout || self.progress.interrupted() {
@@ -381,11 +381,10 @@ impl Search<'_> {
         self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])
     }
 
-    /// The best of `fits`, which stand best first and beside `before`, if it is found: how it was chosen, and its fit with
-    /// what is ordinary beside it.
+    /// The best of `fits`, sorted best first and relative to `before`, if it is selected, and its fit with nuisance terms.
     ///
-    /// Where the ordinary was left out of the round, because it had grown as large as it may be, it may stand for a part
-    /// of what is missing, and the best without it need not be the best with it: all finalists are fitted with it.
+    /// A nuisance term at its upper bound was left out of the round. It may stand for part of the missing physics, so that the best candidate
+    /// without it need not be the best with it: all finalists are refitted with it.
     fn found(
         &self,
         before: &Fitted,
@@ -406,7 +405,7 @@ impl Search<'_> {
         Ok(None)
     }
 
-    /// The same without a look at whether recordings speak for one another; takes it out of `fits`, and says beside what it stands.
+    /// The same without cross-validation; removes the candidate from `fits`, and returns the fit that it is compared with.
     fn best_showing<'f>(
         &self,
         before: &'f Fitted,
@@ -414,7 +413,7 @@ impl Search<'_> {
         fits: &mut Vec<Fitted>,
         worth: Worth,
     ) -> Result<Option<(Chosen, Fitted, &'f Fitted)>, Failure> {
-        // Those that show everywhere before those that only one place asks for.
+        // Candidates that all data support rank before those that a single stretch supports.
         let worth_it = |without, with| worth(&POLICY, without, with);
         let shows = |fitted: &Fitted| fitted.shows(before, &fitted.newest(), worth_it);
         fits.sort_by_key(|fitted| !shows(fitted));
@@ -439,7 +438,7 @@ impl Search<'_> {
         if !losses.found(worth) || !(losses.replaces_ordinary() || shows_beside_it()) {
             return Ok(None);
         }
-        // Those that were not fitted beside the ordinary are taken to gain by it as the best did.
+        // Candidates that were not refitted with the nuisance terms are assumed to improve by the same factor as the best.
         let gains = with_ordinary.loss / best.loss;
         let mut others: Vec<Tried> = fits
             .iter()
@@ -456,7 +455,7 @@ impl Search<'_> {
         Ok(Some((chosen, with_ordinary, without)))
     }
 
-    /// Removes effects that the later ones have made superfluous.
+    /// Removes effects that later ones make superfluous.
     fn prune(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
         if names(chosen) < 2 {
             return Ok(());
@@ -487,7 +486,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Fits the nominal parameters and those of all effects that the rig itself did not state.
+    /// Fits the nominal parameters and the parameters of all effects that are not in the rig file.
     fn fit(&self, layout: Layout, model: &JointModel, rounds: &[f64]) -> Result<Fitted, Failure> {
         let free = layout.free(self.believed, model);
         let solution = solve_in_rounds(self.objective, model, &free, PATIENCE, rounds)?;
@@ -501,29 +500,29 @@ impl Search<'_> {
     }
 }
 
-/// Names among what was chosen: instances of one effect on one part have one name.
+/// Number of named effects; instances of one effect on one component count once.
 fn names(chosen: &[Chosen]) -> usize {
     (0..chosen.len()).filter(|index| !is_further(chosen, *index)).count()
 }
 
-/// Whether what was chosen in a place is an instance of what was chosen before it.
+/// Whether the effect at `index` is a further instance of one before it.
 fn is_further(chosen: &[Chosen], index: usize) -> bool {
     chosen[..index].iter().any(|before| before.effect.is_beside(&chosen[index].effect))
 }
 
-/// Places of all instances of what was chosen in a place.
+/// Indices of all instances of the effect at `index`.
 fn instances(chosen: &[Chosen], index: usize) -> Vec<usize> {
     (0..chosen.len()).filter(|other| chosen[*other].effect.is_beside(&chosen[index].effect)).collect()
 }
 
-/// Takes out what was chosen in these places, which rise.
+/// Removes the effects at these indices, in ascending order.
 fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
     for place in places.iter().rev() {
         chosen.remove(*place);
     }
 }
 
-/// What is left of an effect that is hardly there as itself.
+/// The effect of the catalogue that remains of a negligible one, if any.
 fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffect> {
     let (id, strength) = effect.effect.remainder(&effect.parameters)?;
     let mut other = ActiveEffect { target: effect.target, ..sized(believed, find(id)?) };
@@ -531,15 +530,14 @@ fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffec
     Some(other)
 }
 
-/// Factor of the loss with an effect, where candidates are compared.
+/// Factor on the loss of a candidate in comparisons.
 fn handicap(effect: &ActiveEffect) -> f64 {
     let parameters = effect.descriptor().parameters;
     let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
     POLICY.handicap(parameters.len(), !parameters.iter().zip(effect.parameters).any(unusual))
 }
 
-/// Whether an effect was fitted so weak that it is hardly there, or no more than every bench has, or shows too little of itself
-/// to be told.
+/// Whether a fitted effect is negligible: too weak, within the tolerances of an ordinary bench, or active over too little travel.
 fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffect) -> bool {
     let descriptor = effect.descriptor();
     let Some(strength) = descriptor.parameters.first() else { return false };

@@ -103,7 +103,7 @@ pub(super) fn on_unseen_data(improvement: f64) -> String {
     if improvement >= 0.005 {
         format!("removes {:.0} % of the difference on data the fit did not see", 100.0 * improvement)
     } else {
-        "removes nothing of the difference on data the fit did not see, so that only the data that were fitted speak for it".to_owned()
+        "removes nothing of the difference on data the fit did not see, and is supported by the fitted data alone".to_owned()
     }
 }
 
@@ -120,14 +120,14 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// That no parameter is off, and how far the farthest is.
+/// States that all parameters are within tolerance, and the largest deviation.
 fn as_stated(recalibrated: &[Recalibrated]) -> String {
     let share = |p: &Recalibrated| p.change().abs() / wrong_from(&p.parameter);
     recalibrated.iter().filter(|p| p.nominal != 0.0).max_by(|a, b| share(a).total_cmp(&share(b))).map_or_else(
         || "The rig has no parameter to recalibrate.".to_owned(),
         |p| {
             format!(
-                "No parameter is farther from the rig file than is ordinary, {} ({:+.1} %) the farthest.",
+                "All parameters are within the tolerance of an ordinary rig file; {} deviates most, by {:+.1} %.",
                 p.name(),
                 100.0 * p.change()
             )
@@ -135,7 +135,16 @@ fn as_stated(recalibrated: &[Recalibrated]) -> String {
     )
 }
 
-/// The diagnosis in two sentences.
+/// Items as "a", "a and b", "a, b and c".
+fn listed(items: &[&str]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Summary of the diagnosis in two or three sentences.
 pub(super) fn summary(
     verdict: Verdict,
     effects: &[NamedEffect],
@@ -151,45 +160,48 @@ pub(super) fn summary(
     let parameters = if changed.is_empty() {
         as_stated(recalibrated)
     } else {
-        format!("Parameters that were off: {}.", changed.join(", "))
+        format!("Parameters that were wrong: {}.", changed.join(", "))
     };
     let StageLoss { recalibrated: loss_recalibrated, after: loss_after, .. } = *heldout_loss;
-    let brings = format!(
-        "the held-out loss from {loss_recalibrated:.2} to {loss_after:.2} (normalised error; 1 is what sensor noise and an \
-         ordinary bench leave)"
+    let changes = if loss_after < loss_recalibrated { "reduces" } else { "raises" };
+    let effect = format!(
+        "{changes} the held-out loss from {loss_recalibrated:.2} to {loss_after:.2} (normalised error; 1 is what sensor noise and \
+         an ordinary bench leave)"
     );
     let doubt = if POLICY.pays(loss_recalibrated, loss_after) {
         ""
     } else {
-        " Held-out data do not bear it out: it does not hold there, or they hardly show it."
+        " Held-out data do not confirm this: the effect is absent there, or hardly visible."
     };
     match verdict {
         Verdict::Consistent => {
-            format!(
-                "The simulation agrees with the recordings; nothing is worth adding or changing. {parameters}"
-            )
+            format!("The simulation agrees with the recordings; nothing needs to be added or changed. {parameters}")
         }
-        Verdict::Recalibrate => format!("Parameters were off and no physics is missing. {parameters}"),
+        Verdict::Recalibrate => format!("Parameters were wrong, and no physics is missing. {parameters}"),
         Verdict::MissingPhysics => {
             let names: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
-            format!(
-                "The simulation lacks {}: adding it brings {brings}.{doubt} {parameters}",
-                names.join(" and ")
-            )
+            let them = if names.len() > 1 { "them" } else { "it" };
+            format!("The simulation lacks {}: adding {them} {effect}.{doubt} {parameters}", listed(&names))
         }
         Verdict::Unexplained if by_a_law => format!(
-            "The recordings hold structure that no effect of the catalogue explains; as a formula it brings {brings}.{doubt} \
-             {parameters}"
+            "The recordings contain structure that no effect of the catalogue explains; a formula for it {effect}.{doubt} {parameters}"
         ),
         Verdict::Unexplained => {
-            format!("The recordings hold structure that no effect of the catalogue explains. {parameters}")
+            format!("The recordings contain structure that no effect of the catalogue explains. {parameters}")
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::short;
+    use super::{listed, short};
+
+    #[test]
+    fn the_last_item_of_a_list_follows_an_and() {
+        assert_eq!(listed(&["a"]), "a");
+        assert_eq!(listed(&["a", "b"]), "a and b");
+        assert_eq!(listed(&["a", "b", "c"]), "a, b and c");
+    }
 
     #[test]
     fn numbers_keep_three_digits_and_stay_readable() {

@@ -1,16 +1,16 @@
-//! Whether recordings speak for one another: where there are several, what was found by all of them is fitted to some and has to be worth
-//! its place on the others. A fit of many recordings has room to bend to each.
+//! Cross-validation between recordings: with three or more, an effect that was found on all of them is fitted to some and must reduce the
+//! loss of the others. A fit to many recordings can otherwise adapt to each.
 
 use super::{Fitted, PATIENCE, Search};
 use crate::fit::objective::Part;
 use crate::fit::solver::{FINE_STEP, solve_in_rounds};
 use crate::outcome::Failure;
 
-/// Groups of recordings of which each is left out once.
+/// Number of groups into which recordings are divided; each group is left out once.
 const GROUPS: usize = 3;
 
 impl Search<'_> {
-    /// Whether `with` is worth its place beside `without` on recordings to which neither was fitted. True where there are fewer than three.
+    /// Whether `with` is `worth` more than `without` on recordings to which neither was fitted; true with fewer than three recordings.
     pub(super) fn holds_across_recordings(
         &self,
         without: &Fitted,
@@ -25,12 +25,12 @@ impl Search<'_> {
         Ok(worth(without, with))
     }
 
-    /// Whether there are enough recordings for it.
+    /// Whether there are enough recordings for cross-validation.
     pub(super) fn recordings_judge_one_another(&self) -> bool {
         self.objective.recordings() >= GROUPS
     }
 
-    /// Mean loss of every recording after a fit to those of the other groups.
+    /// Mean loss of the recordings, each after a fit to those of the other groups.
     fn loss_across(&self, fitted: &Fitted) -> Result<f64, Failure> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for group in 0..GROUPS {

@@ -1,22 +1,23 @@
-//! A search that begins with another name: where much is left, the first of the names may have been the wrong one to begin with, and where
-//! none was found, each may be worth little before the others are known. Friction with the square of a load is, before the dry friction
-//! beside it is known, and the other way round.
+//! Restarts of the search with another first effect.
+//!
+//! A greedy search fails where each of several effects reduces the loss little unless the others are present: friction that grows with the
+//! square of the load, for example, without the dry friction next to it. A large remaining loss is the sign of it.
 
 use super::{Attempted, Chosen, Fitted, PROMISING, Round, Search, Tried, handicap};
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
-/// Most rivals of the first name with which a search begins again.
+/// Maximum number of rivals of the first effect from which the search restarts.
 const RIVALS: usize = 4;
 
-/// The same where no name was found.
+/// Maximum number of candidates from which the search restarts if it found no effect.
 const BEGINNINGS: usize = 3;
 
 impl Search<'_> {
-    /// Where the names leave more than [`Policy::much_left`](crate::diagnose::policy::Policy::much_left), searches again with each of the best
-    /// rivals of the first in its place, and keeps what is worth a name more than what is there. Where no name was found, with each of the
-    /// best of the first round; what is found then is worth its place beside the others, though not alone. `nothing` is the fit without any.
+    /// Restarts the search from each of the best rivals of the first effect if the remaining loss is above
+    /// [`Policy::much_left`](crate::diagnose::policy::Policy::much_left), and keeps the best result that is better by at least what a name
+    /// must achieve. If no effect was found, it restarts from the best candidates of the first round. `nothing` is the fit without effects.
     pub(super) fn begin_again(
         &self,
         nothing: &Fitted,
@@ -70,9 +71,9 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether other names are to take the place of those that are there. Each of either is worth its place beside the others of its own.
-    /// Where recordings can judge one another those that predict better do; where they cannot, or where nothing is there yet, the others have
-    /// to be worth a name more.
+    /// Whether the effects of a restart replace the present ones. Each effect of either set is necessary within its set. With enough
+    /// recordings for cross-validation the set that predicts better wins; otherwise, or if no effect was found before, the new set must
+    /// reduce the loss by what a name must achieve.
     fn is_better(
         &self,
         (present, chosen): (&Fitted, &[Chosen]),
@@ -89,7 +90,7 @@ impl Search<'_> {
     }
 }
 
-/// The candidates of the first round that were fitted and take off what a name must promise, best first.
+/// Fitted candidates of the first round whose reduction of the loss reaches [`PROMISING`], best first.
 fn beginnings(nothing: &Fitted, rounds: &[Round]) -> Vec<Tried> {
     let Some(first) = rounds.first() else { return Vec::new() };
     let fitted = |attempted: &Attempted| {
@@ -103,7 +104,7 @@ fn beginnings(nothing: &Fitted, rounds: &[Round]) -> Vec<Tried> {
     all
 }
 
-/// Factor of the loss with several effects, where they are compared with others.
+/// Factor on the loss of a set of effects in comparisons.
 fn handicap_of_all(chosen: &[Chosen]) -> f64 {
     chosen.iter().map(|one| handicap(&one.effect)).product()
 }

@@ -1,7 +1,7 @@
-//! Names against their rivals once more, beside all that was found after them.
+//! Comparison of each named effect with its rivals once all effects are known.
 //!
-//! A name is chosen while others are still missing, and what it is chosen for may be a part of what they do: its rivals of that round are
-//! fitted in its place beside the others, one takes the place where it predicts better, and the odds of all are those of the end.
+//! An effect is selected while others are still missing and may stand for part of them. Its rivals of that round are therefore refitted in its
+//! place together with the other effects; a rival that predicts better replaces it, and the reported odds follow from these fits.
 
 use bowden_model::effect::{ActiveEffect, Component};
 
@@ -10,14 +10,14 @@ use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
-/// Most rivals of a name that are fitted in its place.
+/// Maximum number of rivals that are refitted in place of an effect.
 const RIVALS: usize = 3;
 
 impl Search<'_> {
-    /// Fits the rivals of every name but the last in its place, and keeps what predicts best.
+    /// Refits the rivals of every effect but the last in its place, and keeps the best.
     pub(super) fn exchange(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
         let last = (0..chosen.len()).rfind(|index| !is_further(chosen, *index)).unwrap_or(0);
-        // What takes a place stands last, so that places before it stay.
+        // A replacement is appended, so that the places of the effects before it do not change.
         for index in (0..last).rev() {
             if !is_further(chosen, index) && !self.progress.interrupted() {
                 self.exchange_one(index, present, chosen)?;
@@ -39,7 +39,7 @@ impl Search<'_> {
         let own = &mut chosen[index];
         let not_fitted = own.others.split_off(rivals.len());
         own.others = rivals.iter().map(|fitted| fitted.tried(fitted.loss)).collect();
-        // The others keep their odds.
+        // Candidates that are not refitted keep their odds.
         let now = present.loss / own.loss_after;
         own.others.extend(not_fitted.into_iter().map(|tried| Tried { loss: now * tried.loss, ..tried }));
         own.loss_after = present.loss;
@@ -64,7 +64,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The first of `rivals` that is told from the parameters, beside `present` without what they stand in the place of.
+    /// The first of `rivals` that can be distinguished from a change of parameters, compared with `present` without the replaced effect.
     fn first_told(
         &self,
         rivals: Vec<Fitted>,
@@ -73,7 +73,7 @@ impl Search<'_> {
     ) -> Result<Option<Fitted>, Failure> {
         let mut without: Option<Fitted> = None;
         for rival in rivals {
-            // Only a sensor has to be held against a fit without it.
+            // Only errors of sensors need the comparison with a fit without them.
             if rival.newest().descriptor().component != Component::Sensors {
                 return Ok(Some(rival));
             }
@@ -91,7 +91,7 @@ impl Search<'_> {
         Ok(None)
     }
 
-    /// The listed rivals of a name, which stand first among its others, each fitted in its place beside all that was found.
+    /// The listed rivals of an effect, first among its `others`, each refitted in its place together with all other effects.
     fn rivals_beside_the_rest(
         &self,
         index: usize,

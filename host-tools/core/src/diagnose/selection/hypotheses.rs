@@ -1,4 +1,4 @@
-//! Hypotheses of the user, each by itself beside the recalibrated rig, and what else does best in its place.
+//! Hypotheses of the user: each is fitted alone on top of the recalibrated rig and compared with the best alternatives.
 
 use bowden_model::effect::ActiveEffect;
 
@@ -11,12 +11,12 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
 
-/// A hypothesis, fitted to the end.
+/// A hypothesis after a converged fit.
 #[derive(Clone)]
 pub struct Trial {
-    /// Which.
+    /// Index of the hypothesis.
     pub hypothesis: &'static Hypothesis,
-    /// As it was fitted.
+    /// Fitted effect.
     pub effect: ActiveEffect,
     /// Standard deviations of its coefficients.
     pub stds: Vec<Option<f64>>,
@@ -26,7 +26,7 @@ pub struct Trial {
     pub with: JointModel,
     /// Loss with it.
     pub loss: f64,
-    /// What else does best in its place.
+    /// Best alternatives.
     pub rivals: Rivals,
 }
 
@@ -39,7 +39,7 @@ impl std::fmt::Debug for Trial {
     }
 }
 
-/// The best of each kind in place of a hypothesis; `None` where none is worth a fit.
+/// Best alternative of each kind to a hypothesis; `None` if none was fitted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rivals {
     /// Effect of the catalogue.
@@ -50,7 +50,7 @@ pub struct Rivals {
     pub free_curve: Option<BestRival>,
 }
 
-/// What does best of its kind, by the loss of what is fitted.
+/// Alternative of its kind with the lowest loss.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BestRival {
     /// Effect, law, or variable of a curve.
@@ -62,7 +62,7 @@ pub struct BestRival {
 }
 
 impl Search<'_> {
-    /// Tries every hypothesis by itself.
+    /// Fits every hypothesis alone.
     pub(super) fn trials(&self, nothing: &Fitted) -> Result<Vec<Trial>, Failure> {
         if self.asked.hypotheses.is_empty() || self.progress.interrupted() {
             return Ok(Vec::new());
@@ -106,7 +106,7 @@ impl Search<'_> {
         Ok(trials)
     }
 
-    /// One hypothesis beside `before`, fitted to the end; `None` when the work is to end.
+    /// Converged fit of one hypothesis on top of `before`; `None` if the work was interrupted.
     fn alone(
         &self,
         before: &Fitted,

@@ -1,5 +1,5 @@
-//! Laws that the data ask for in place of the names, or beside them: tried once no further name is found, and held to more than a
-//! name is.
+//! Selection of laws, in place of named effects or in addition to them. Laws are tried once no further effect is found, and must reduce the
+//! loss by more than an effect must.
 
 use bowden_model::effect::{ActiveEffect, Component};
 
@@ -9,16 +9,16 @@ use crate::diagnose::unexplained::unexplained;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
-/// Most laws that are found.
+/// Maximum number of laws.
 const MOST_LAWS: usize = 2;
 
-/// Part of what names take off the loss that a law must promise to take off in their place, to be fitted.
+/// Minimum estimated reduction of the loss by a law, relative to that of the effects it would replace, for it to be fitted.
 const RIVALLING: f64 = 0.5;
 
 impl Search<'_> {
-    /// Puts one law in the place of all names, or of all but the first, where it predicts clearly better than they do: by [`Policy::worth_stating`]
-    /// what one name does, and by as much as a name must be worth what several do, or one that is of the same sensor. `nothing` is the fit
-    /// without either. Says whether it did.
+    /// Replaces all named effects, or all but the first, by one law that predicts clearly better, and returns whether it did. Against one
+    /// effect the law must reach [`Policy::worth_stating`]; against several, or one of the same sensor, what a name must achieve.
+    /// `nothing` is the fit without effects.
     pub(super) fn law_in_place_of_names(
         &self,
         nothing: &Fitted,
@@ -63,8 +63,8 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// Adds the laws that are worth stating to what was found, and takes out names that one of them makes superfluous: a name
-    /// may have been the nearest thing on the list.
+    /// Adds laws that reach their threshold, and removes effects that a law makes superfluous: such an effect was only the nearest
+    /// entry of the catalogue.
     pub(super) fn add_laws(
         &self,
         present: &mut Fitted,
@@ -75,7 +75,7 @@ impl Search<'_> {
             if self.progress.interrupted() || !POLICY.worth_stating(present.loss, 0.0) {
                 break;
             }
-            // Where a free form has shown that something is left, and where, a law of that part need be worth no more than a name.
+            // If a free form has already located a remaining structure, a law of that component needs no more than an effect.
             let left = unexplained(self.objective, None, &present.solution.model)?;
             let before = self.without_exhausted(present)?;
             let (record, fits) = self.one_more(&before, Kind::Law, PROMISING)?;
@@ -95,7 +95,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether both change what one sensor reads: their losses differ by its channel alone, and not by all that a joint does.
+/// Whether both change the reading of the same sensor, so that their losses differ in its channel alone.
 fn are_of_one_sensor(one: &ActiveEffect, other: &ActiveEffect) -> bool {
     let of_sensor = |effect: &ActiveEffect| effect.descriptor().component == Component::Sensors;
     of_sensor(one) && of_sensor(other) && one.target.overlaps(other.target)

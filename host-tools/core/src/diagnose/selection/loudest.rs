@@ -1,18 +1,18 @@
-//! What an effect is worth without what speaks most for it: what a single moment asks for, or a single recording of several, is no
-//! physics to be named.
+//! Loss reduction of an effect without the data that support it most. Support by a single moment, or by one recording of several, is not enough
+//! to name an effect.
 
 use std::collections::BTreeMap;
 
 use crate::fit::objective::StretchLosses;
 
-/// Of so many stretches, or recordings, one does not count for what it asks for.
+/// One of so many stretches, or recordings, is left out.
 const LOUDEST: usize = 10;
 
-/// Recordings from which on none may decide alone.
+/// Minimum number of recordings from which no single one may decide.
 const SEVERAL: usize = 3;
 
-/// Mean losses without and with something, but for the stretches in which it takes most off, and, where there are several recordings, but for
-/// the recordings in which it does.
+/// Mean losses without and with an effect, leaving out the stretches with the largest reduction, and for several recordings a second pair
+/// that leaves out the recordings with the largest reduction.
 pub(super) fn without_the_loudest(without: &StretchLosses, with: &StretchLosses) -> Vec<[f64; 2]> {
     let mut quieter = vec![of_units(without.values().zip(with.values()).map(|(a, b)| (*a, *b)).collect())];
     let [of_recordings, with] = [without, with].map(by_recording);
@@ -31,7 +31,7 @@ fn by_recording(stretches: &StretchLosses) -> BTreeMap<usize, [f64; 2]> {
     sums
 }
 
-/// Mean losses without and with something over all but the loudest of some parts of the data.
+/// Mean losses without and with an effect over all parts of the data but those with the largest reduction.
 fn of_units(mut pairs: Vec<([f64; 2], [f64; 2])>) -> [f64; 2] {
     let taken_off = |([without, _], [with, _]): &([f64; 2], [f64; 2])| without - with;
     pairs.sort_by(|a, b| taken_off(a).total_cmp(&taken_off(b)));

@@ -1,9 +1,8 @@
-//! Whether what a sensor has recorded can tell that the sensor is wrong, and not that a parameter is.
+//! Whether the error of a sensor can be distinguished, in its own channel, from a change of parameters.
 //!
-//! What is missing elsewhere bends parameters, and a sensor that is said to be wrong can pay what that costs in its own channel. The
-//! current of a motor whose angle is prescribed is `(V - k_t ω) / R`: another gain is another `R` and `k_t`, and only torques, with all
-//! friction that they contain, tell them apart. Play of a joint draws the resistance down by 2 to 8 %, and a gain of 0.91 takes back what
-//! that does to the current, which is right by the rig file.
+//! Missing physics biases parameters, and a spurious sensor error can compensate that bias in its own channel. The current of a motor whose
+//! angle is prescribed is `(V - k_t ω) / R`: a gain of the current sensor equals a change of `R` and `k_t`, and only torques, with all their
+//! friction, distinguish them. Joint play, for example, biases the resistance by -2 to -8 %, and a gain of 0.91 then compensates the current.
 
 use bowden_model::effect::Component;
 use nalgebra::{DMatrix, DVector};
@@ -15,13 +14,13 @@ use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 
-/// Singular value, over the largest, below which a direction of the parameters changes nothing.
+/// Relative singular value below which a direction of the parameters is treated as without influence.
 const SMALLEST: f64 = 1e-9;
 
 impl Search<'_> {
-    /// Whether effect `place` of `with` is told from the parameters, beside `without`, which lacks it: true for what is no effect of a
-    /// sensor, for one that changes its own channel in a way in which no parameter does, by as much as a name must take off, and for
-    /// one that takes off the share that a law must.
+    /// Whether effect `place` of `with` is no mere change of parameters; `without` lacks it. True for an effect that is not of a sensor, for
+    /// one that changes its own channel as no parameter does by at least what a name must achieve, and for one that reaches the share of
+    /// a law.
     pub(super) fn is_no_parameter(
         &self,
         without: &Fitted,
@@ -37,15 +36,15 @@ impl Search<'_> {
         Ok(told || self.own_change(with, place)?.is_none_or(is_worth_a_name))
     }
 
-    /// Mean, in squared scales, of what effect `place` of `with` changes in its own channel and recalibrated parameters cannot change
-    /// alike; `None` where the channel drives the replay.
+    /// Mean square, in noise scales, of the change that effect `place` of `with` makes in its own channel and no change of parameters can
+    /// make; `None` if the channel drives the replay.
     fn own_change(&self, with: &Fitted, place: usize) -> Result<Option<f64>, Failure> {
         let Solution { model, residuals, jacobian, .. } = &with.solution;
         let effect = &model.effects[place];
         let [objective, _] = &self.objective.split();
         let is_of_sensor =
             |series| matches!(series, Series::Channel(channel) if effect.target.includes(channel));
-        // Places among the rows of the slopes and among all residuals.
+        // Indices among the rows of the sensitivities and among all residuals.
         let own: Vec<(usize, usize)> = objective
             .entries()
             .enumerate()
@@ -70,7 +69,7 @@ impl Search<'_> {
     }
 }
 
-/// The part of `change` that no combination of the columns of `slopes` makes.
+/// The component of `change` that is orthogonal to all columns of `slopes`.
 fn left_by(slopes: DMatrix<f64>, change: &DVector<f64>) -> DVector<f64> {
     if slopes.ncols() == 0 {
         return change.clone();

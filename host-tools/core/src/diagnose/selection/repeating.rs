@@ -1,7 +1,7 @@
-//! Further instances of an effect that a part has several times: the harmonics of cogging beside the strongest.
+//! Further instances of an effect that one component has several times, such as the harmonics of cogging.
 //!
-//! They are no further names, and each by itself may be worth little: a torque whose reading comes late hides all but the strongest
-//! until the lag is known. They are therefore added together and held to what they do together.
+//! They are not further effects, and each alone may reduce the loss little: the lag of a torque sensor hides all but the strongest until it is
+//! known. They are therefore added and judged together.
 
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
@@ -18,17 +18,17 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
 
-/// Most instances of one effect.
+/// Maximum number of instances of one effect.
 const MOST_INSTANCES: usize = 8;
 
-/// Effects of a simulation that are left to other names.
+/// Number of effects of a simulation that is reserved for other effects.
 const LEFT_TO_NAMES: usize = 3;
 
-/// Share of the fitted loss that an instance takes off before anything is fitted anew, to be fitted with the others.
+/// Minimum relative reduction of the loss by an instance, before any refit, for it to be fitted with the others.
 const PROMISING_INSTANCE: f64 = 0.01;
 
 impl Search<'_> {
-    /// Adds further instances of every chosen effect that has several, where the fit gains by them.
+    /// Adds further instances of every effect that may have several, if they improve the fit.
     pub(super) fn add_instances(
         &self,
         present: &mut Fitted,
@@ -63,8 +63,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The model of `present` with the strongest patterns that are left, one after the other, where each takes something off the fitted
-    /// loss, its layout, and how many they are; `None` where none does.
+    /// The model of `present` with the strongest remaining patterns, added one after the other while each reduces the loss, its layout, and
+    /// their number; `None` if none does.
     fn further_instances(
         &self,
         present: &Fitted,
@@ -98,7 +98,7 @@ impl Search<'_> {
                 break;
             };
             let (next_layout, mut next) = layout.with(&model, new);
-            // The new one stands last, behind those beside it.
+            // The new instance is appended behind the others of its effect.
             let others = next.effects[found].iter_mut().filter(|other| other.is_beside(effect));
             others.zip(beside).for_each(|(other, beside)| *other = beside);
             let next_predictions = objective.predict(&next)?;

@@ -1,4 +1,4 @@
-//! One round of the search: what screening ranks first is fitted, what then fits best is fitted to the end.
+//! One round of the search: the candidates that screening ranks first are fitted coarsely, and the best of these to convergence.
 
 use rayon::prelude::*;
 
@@ -11,19 +11,19 @@ use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
 
-/// Candidates that are fitted, of those that screening ranks first.
+/// Number of candidates that are fitted, in the order of screening.
 const FITTED: usize = 7;
 
-/// Loss, over that of the best, beyond which a candidate is no finalist.
+/// Loss relative to the best above which a candidate is not fitted to convergence.
 const BEHIND: f64 = 2.5;
 
-/// Part of its estimated gain that a candidate's fit with the slopes of the present model has to reach; one that does not is fitted
-/// with slopes of its own.
+/// Minimum reduction of the loss, relative to the estimate of screening, by a fit that reuses the sensitivities of the present model; a
+/// candidate below it is refitted with its own sensitivities.
 const KEPT_PROMISE: f64 = 0.5;
 
 impl Search<'_> {
-    /// Tries every effect beside those of `present`: what screening ranks first is fitted, and what then fits best is
-    /// fitted to the end, of those that promise at least so much. Returns all candidates for the record, and the fits, best first.
+    /// Tries every further effect in addition to those of `present`: screens all, fits the first coarsely, and fits the best of these to
+    /// convergence, provided that the estimated reduction reaches `promising`. Returns all candidates for the record, and the fits, best first.
     pub(super) fn one_more(
         &self,
         present: &Fitted,
@@ -43,7 +43,7 @@ impl Search<'_> {
         self.best_of(present, &predictions, &all, promising)
     }
 
-    /// The same for given candidates; `predictions` are those of `present`.
+    /// The same for the given candidates; `predictions` are those of `present`.
     pub(super) fn best_of(
         &self,
         present: &Fitted,
@@ -89,7 +89,7 @@ impl Search<'_> {
             keep(*place, fitted);
         }
         best_first(&mut fits);
-        // Finished fits may have fallen behind one that only ranks; what is chosen is fitted to the end.
+        // A converged fit may rank behind a coarse one; the selected candidate must be converged.
         while let Some((place, first)) = fits.first_mut().filter(|(_, first)| !first.finished)
             && !progress.interrupted()
         {
@@ -107,10 +107,10 @@ impl Search<'_> {
         Ok(Fitted { unseen, ..finished })
     }
 
-    /// `present` with each of the candidates, by their places, fitted only as far as a ranking needs.
+    /// Coarse fits, sufficient for ranking, of `present` with each of the candidates, and their indices.
     fn fit_promising(&self, present: &Fitted, ranked: &[Screened]) -> Result<Vec<(usize, Fitted)>, Failure> {
         let progress = self.progress;
-        // One fit by itself leaves threads idle between its rounds of slopes.
+        // A single fit leaves threads idle between its sensitivity passes.
         let fits: Result<Vec<Option<(usize, Fitted)>>, Failure> = ranked
             .par_iter()
             .enumerate()
@@ -122,8 +122,8 @@ impl Search<'_> {
             })
             .collect();
         let mut fits: Vec<(usize, Fitted)> = fits?.into_iter().flatten().collect();
-        // The slopes of the present model may have led astray: stick and slip bend the way. Where what was promised would still
-        // be the best, slopes of its own show the way.
+        // Sensitivities of the present model mislead where stick-slip makes the loss nonlinear. A candidate whose estimate would still
+        // rank first is refitted with its own.
         let before = present.loss;
         let best = fits.iter().map(|(_, fitted)| fitted.loss).fold(f64::INFINITY, f64::min);
         fits.par_iter_mut().try_for_each(|(place, fitted)| {
@@ -140,7 +140,7 @@ impl Search<'_> {
         Ok(fits)
     }
 
-    /// `present` with one more effect, fitted only as far as a ranking needs, with the slopes of `present` or slopes of its own.
+    /// Coarse fit of `present` with one more effect, with the sensitivities of `present` or its own.
     fn fit_new(&self, present: &Fitted, screened: &Screened, known_slopes: bool) -> Result<Fitted, Failure> {
         let without = screened.room.as_ref().unwrap_or(&present.solution.model);
         let (layout, with) = present.layout.with(without, screened.start);
