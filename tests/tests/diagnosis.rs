@@ -109,7 +109,7 @@ impl Outcome {
         let unexplained = diagnosis.unexplained.as_ref().unwrap();
         assert!(unexplained.modelled && unexplained.law.as_ref().unwrap().contains(&law.formula));
         assert_eq!(unexplained.component, law.component);
-        assert!(diagnosis.summary.contains("as a formula it brings"), "{}", diagnosis.summary);
+        assert!(diagnosis.summary.contains("a formula for it reduces"), "{}", diagnosis.summary);
         law
     }
 

@@ -120,14 +120,14 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// States that all parameters are within tolerance, and the largest deviation.
+/// States that no parameter is significantly wrong, and the largest deviation.
 fn as_stated(recalibrated: &[Recalibrated]) -> String {
     let share = |p: &Recalibrated| p.change().abs() / wrong_from(&p.parameter);
     recalibrated.iter().filter(|p| p.nominal != 0.0).max_by(|a, b| share(a).total_cmp(&share(b))).map_or_else(
         || "The rig has no parameter to recalibrate.".to_owned(),
         |p| {
             format!(
-                "All parameters are within the tolerance of an ordinary rig file; {} deviates most, by {:+.1} %.",
+                "No parameter is significantly wrong; {} deviates most from the rig file, by {:+.1} %.",
                 p.name(),
                 100.0 * p.change()
             )
@@ -175,7 +175,9 @@ pub(super) fn summary(
     };
     match verdict {
         Verdict::Consistent => {
-            format!("The simulation agrees with the recordings; nothing needs to be added or changed. {parameters}")
+            format!(
+                "The simulation agrees with the recordings; nothing needs to be added or changed. {parameters}"
+            )
         }
         Verdict::Recalibrate => format!("Parameters were wrong, and no physics is missing. {parameters}"),
         Verdict::MissingPhysics => {
