@@ -77,7 +77,7 @@ fn torque_error(bench: &Bench, reference: f64) -> f64 {
 
 /// Slow motion sticks and slips, and what that leaves depends on where it sticks: the RMS over several amplitudes.
 fn error(parameters: &Parameters, effects: &[ActiveEffect], mode: Mode, reference: Reference) -> f64 {
-    let squares: Vec<f64> = beside(reference)
+    let squares: Vec<f64> = nearby(reference)
         .into_iter()
         .map(|reference| {
             let mut bench = running(parameters, effects, mode, reference);
@@ -87,8 +87,8 @@ fn error(parameters: &Parameters, effects: &[ActiveEffect], mode: Mode, referenc
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// A reference, or where it is slow the same at amplitudes beside its own.
-fn beside(reference: Reference) -> Vec<Reference> {
+/// A reference, or for a slow one references with amplitudes near its own.
+fn nearby(reference: Reference) -> Vec<Reference> {
     const SLOW_HZ: f32 = 0.1;
     match reference {
         Reference::Generated { shape, amplitude, frequency_hz, .. } if frequency_hz <= SLOW_HZ => {
@@ -165,7 +165,7 @@ fn friction_that_makes_the_loop_stick_and_slip_costs_little_at_a_crawl_alone() {
         assert!(after < before, "{reference:?}: {after} after {before}");
     }
     let [_, before, after] = errors(falling, &motor_friction(0.1, 0.15), Mode::Position, crawl());
-    assert!(after < 1.5 * before, "{after} after {before}");
+    assert!(after < 1.2 * before, "{after} after {before}");
 }
 
 #[test]
