@@ -63,7 +63,6 @@ impl Search<'_> {
             }
         }
         if let Some((other, others_chosen)) = best
-            && !others_chosen.is_empty()
             && self.is_better((present, chosen), (&other, &others_chosen))?
         {
             (*present, *chosen) = (other, others_chosen);
