@@ -14,9 +14,9 @@ pub const SCHEMA: &str = "bowden-diagnosis/1";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Nothing worth adding or changing.
+    /// Nothing needs to be added or changed.
     Consistent,
-    /// Parameters were off, no physics is missing.
+    /// Parameters were wrong, no physics is missing.
     Recalibrate,
     /// Physics is missing, and named.
     MissingPhysics,

@@ -196,7 +196,29 @@ pub(super) fn summary(
 
 #[cfg(test)]
 mod tests {
-    use super::{listed, short};
+    use super::{listed, short, summary};
+    use crate::diagnose::verdict::{StageLoss, Verdict};
+
+    /// A loss that falls, one that falls too little to confirm anything, and one that rises.
+    #[test]
+    fn a_summary_says_whether_the_held_out_loss_falls_and_whether_that_is_enough() {
+        let said = |after: f64| {
+            let loss = StageLoss { before: 9.0, recalibrated: 4.0, after };
+            summary(Verdict::Unexplained, &[], &[], true, &loss)
+        };
+        assert!(
+            said(1.0).contains("a formula for it reduces the held-out loss from 4.00 to 1.00 (")
+                && !said(1.0).contains("not confirm")
+        );
+        assert!(
+            said(3.9).contains(" reduces the held-out loss from 4.00 to 3.90 (")
+                && said(3.9).contains("do not confirm this")
+        );
+        assert!(
+            said(5.0).contains(" raises the held-out loss from 4.00 to 5.00 (")
+                && said(5.0).contains("do not confirm this")
+        );
+    }
 
     #[test]
     fn the_last_item_of_a_list_follows_an_and() {

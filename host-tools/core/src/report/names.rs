@@ -66,8 +66,8 @@ pub(super) fn component(name: &str) -> String {
 pub(super) fn verdict(findings: &Findings) -> String {
     let diagnosis = &findings.diagnosis;
     match diagnosis.verdict {
-        Verdict::Consistent => "Consistent: nothing worth adding or changing".into(),
-        Verdict::Recalibrate => "Recalibrate: parameters were off, no physics is missing".into(),
+        Verdict::Consistent => "Consistent: nothing needs to be added or changed".into(),
+        Verdict::Recalibrate => "Recalibrate: parameters were wrong, no physics is missing".into(),
         Verdict::Unexplained => {
             "Unexplained: structure is left that no effect of the catalogue explains".into()
         }
