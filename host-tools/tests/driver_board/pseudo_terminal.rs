@@ -44,9 +44,8 @@ const BATCH: Duration = Duration::from_nanos(PERIOD_NS * BATCH_LENGTH as u64);
 pub struct Terminal {
     fake: Arc<Mutex<Fake>>,
     stop: Arc<AtomicBool>,
-    /// Stopped within a frame.
-    within: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    /// Gives back the terminal's end and what is not sent.
+    thread: Option<JoinHandle<(File, Vec<u8>)>>,
     port: String,
     /// Other name of the port, which stays when it is plugged in again.
     link: Option<PathBuf>,
@@ -80,16 +79,9 @@ impl Terminal {
         fcntl_setfl(&master, OFlags::NONBLOCK).unwrap();
 
         let stop = Arc::new(AtomicBool::new(false));
-        let within = Arc::new(AtomicBool::new(false));
-        let (shared, stopped, cut) = (Arc::clone(&fake), Arc::clone(&stop), Arc::clone(&within));
-        let thread = std::thread::spawn(move || {
-            let mut master = File::from(master);
-            let unsent = serve(&mut master, &shared, &stopped);
-            if cut.load(Ordering::Relaxed) {
-                send_without_its_end(&mut master, &shared, unsent);
-            }
-        });
-        Self { fake, stop, within, thread: Some(thread), port, link: None, _slave: slave }
+        let (shared, stopped) = (Arc::clone(&fake), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || serve(File::from(master), &shared, &stopped));
+        Self { fake, stop, thread: Some(thread), port, link: None, _slave: slave }
     }
 
     pub fn port(&self) -> &str {
@@ -119,17 +111,23 @@ impl Terminal {
 
     /// Pulls the plug while a frame is on its way: its last bytes do not arrive.
     pub fn unplug_within_a_frame(&mut self) {
-        self.within.store(true, Ordering::Relaxed);
-        self.unplug();
+        let (mut master, unsent) = self.silence();
+        send_without_its_end(&mut master, &self.fake, unsent);
     }
 
     /// Pulls the plug.
     pub fn unplug(&mut self) {
+        self.silence();
+    }
+
+    /// Stops the thread; the terminal ends with what is returned.
+    fn silence(&mut self) -> (File, Vec<u8>) {
         self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().unwrap().join().unwrap();
+        let rest = self.thread.take().unwrap().join().unwrap();
         if let Some(link) = &self.link {
             remove_file(link).unwrap();
         }
+        rest
     }
 
     /// Plugs the board in again, as another device.
@@ -152,8 +150,8 @@ impl Drop for Terminal {
     }
 }
 
-/// Moves bytes between terminal and board, and the board's clock as far as its host allows, until told to stop; returns what is not sent.
-fn serve(master: &mut File, fake: &Mutex<Fake>, stop: &AtomicBool) -> Vec<u8> {
+/// Moves bytes between terminal and board, and the board's clock as far as its host allows, until told to stop; returns the terminal and what is not sent.
+fn serve(mut master: File, fake: &Mutex<Fake>, stop: &AtomicBool) -> (File, Vec<u8>) {
     let mut buffer = [0; 4096];
     let mut unsent = Vec::new();
     let mut allowed_until = Duration::ZERO;
@@ -182,10 +180,10 @@ fn serve(master: &mut File, fake: &Mutex<Fake>, stop: &AtomicBool) -> Vec<u8> {
         if received == 0 && sent == 0 && !goes_on {
             let room = if unsent.is_empty() { PollFlags::empty() } else { PollFlags::OUT };
             // Without an event, or with an interrupted wait, the loop looks again.
-            let _ = poll(&mut [PollFd::new(master, PollFlags::IN | room)], Some(&WAKE));
+            let _ = poll(&mut [PollFd::new(&master, PollFlags::IN | room)], Some(&WAKE));
         }
     }
-    unsent
+    (master, unsent)
 }
 
 /// Sends what is unsent and a batch of samples, but for the last bytes.
