@@ -51,6 +51,12 @@ impl Outcome {
         Self::of_recorded(Recorded::Everything, case, seconds, asked)
     }
 
+    /// A bench of the proof.
+    fn of_plan(seed: u64, name: &str) -> Self {
+        let plan = plans(seed).into_iter().find(|plan| plan.name == name).unwrap();
+        Self::over(&plan.case().unwrap(), TRAINING_S, &[])
+    }
+
     fn of_recorded(recorded: Recorded, case: &Case, seconds: f64, asked: &[&str]) -> Self {
         let begun = Instant::now();
         let training = recording_of(&recorded.of(case.train(MotionKind::Lab, seconds).unwrap(), 1));
@@ -84,6 +90,13 @@ impl Outcome {
         }
         println!("  {:?}\n  {:?}", d.recalibrated, d.unexplained);
         outcome
+    }
+
+    /// Names of all effects, in alphabetical order.
+    fn ids(&self) -> Vec<&str> {
+        let mut ids: Vec<&str> = self.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
+        ids.sort_unstable();
+        ids
     }
 
     /// The one effect that is named, which has to be this one.
@@ -236,11 +249,8 @@ fn tensions_that_were_not_recorded_are_predicted_no_worse() {
 /// warming, and how much a watt does is not in the rig file.
 #[test]
 fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
-    let plan = plans(1).into_iter().find(|plan| plan.name == "pair/15").unwrap();
-    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
-    let mut found: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
-    found.sort_unstable();
-    assert_eq!(found, ["winding_heating", "wrap_angle_varies_with_pose"]);
+    let outcome = Outcome::of_plan(1, "pair/15");
+    assert_eq!(outcome.ids(), ["winding_heating", "wrap_angle_varies_with_pose"]);
     let resistance = outcome.diagnosis.recalibrated.iter().find(|p| p.parameter == "motor.resistance_ohm");
     let resistance = resistance.unwrap();
     assert!((resistance.fitted / resistance.nominal - 1.0).abs() < 0.1, "{resistance:?}");
@@ -251,10 +261,8 @@ fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
 /// much as any law.
 #[test]
 fn a_reading_that_sets_in_is_no_wrong_zero() {
-    let plan = plans(606).into_iter().find(|plan| plan.name == "mixed/01").unwrap();
-    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
-    let found: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
-    assert_eq!(found, ["joint_spring"]);
+    let outcome = Outcome::of_plan(606, "mixed/01");
+    assert_eq!(outcome.ids(), ["joint_spring"]);
     let [law] = &outcome.diagnosis.laws[..] else { panic!("{:?}", outcome.diagnosis.laws) };
     assert_eq!(law.channel.as_deref(), Some("f3_n"), "{law:?}");
     for (name, concealed, tolerance) in [("amplitude", 1.95, 0.15), ("time_constant_s", 9.8, 0.3)] {
@@ -267,11 +275,8 @@ fn a_reading_that_sets_in_is_no_wrong_zero() {
 /// Dry friction of the joint, a friction that prefers a direction and a wrong zero: none is worth its name alone, each is beside the others.
 #[test]
 fn what_is_worth_little_alone_is_found_beside_the_rest() {
-    let plan = plans(606).into_iter().find(|plan| plan.name == "triple/00").unwrap();
-    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
-    let mut found: Vec<&str> = outcome.diagnosis.effects.iter().map(|effect| effect.id.as_str()).collect();
-    found.sort_unstable();
-    assert_eq!(found, ["asymmetric_friction", "joint_coulomb_friction", "sensor_offset"]);
+    let outcome = Outcome::of_plan(606, "triple/00");
+    assert_eq!(outcome.ids(), ["asymmetric_friction", "joint_coulomb_friction", "sensor_offset"]);
     outcome.predicts_within(0.5);
 }
 
@@ -279,8 +284,7 @@ fn what_is_worth_little_alone_is_found_beside_the_rest() {
 /// is ordinary and at its resolution, and takes less than a hundredth off the loss of the rig that is written.
 #[test]
 fn what_the_written_rig_does_not_gain_by_is_not_found() {
-    let plan = plans(1).into_iter().find(|plan| plan.name == "parameters/23").unwrap();
-    let outcome = Outcome::over(&plan.case().unwrap(), TRAINING_S, &[]);
+    let outcome = Outcome::of_plan(1, "parameters/23");
     assert_eq!(outcome.diagnosis.verdict, Verdict::Recalibrate);
     assert_eq!(outcome.diagnosis.effects, []);
 }
