@@ -196,7 +196,7 @@ fn reports_with_little_in_them_still_read() {
     let mut findings = example::consistent();
     let text = text_of(&render(&findings));
     for expected in
-        ["Consistent: nothing worth", "No place stands out.", "No effect of the catalogue is named."]
+        ["Consistent: nothing needs", "No place stands out.", "No effect of the catalogue is named."]
     {
         assert!(text.contains(expected), "{expected:?} is missing");
     }
