@@ -37,45 +37,124 @@ pub fn pulley_inertia_kg_m2(motor: &MotorParameters) -> f64 {
     motor.rotor_inertia_kg_m2 * motor.gear_ratio * motor.gear_ratio
 }
 
-/// Current after a step of `dt_s`, A, at the pulley speed `omega_rad_s`.
+/// Current of the winding over one step: second order in the step, stable for every step; for steps far above L/R it is the stationary
+/// current.
 ///
-/// Implicit Euler: stable for every step, and for steps far above L/R it gives the stationary current.
-#[must_use]
-pub fn current_after_a(
-    motor: &MotorParameters,
-    effects: &EffectSet,
-    states: &mut EffectStates,
-    bridge: BridgeInput,
-    (t_s, dt_s): (f64, f64),
+/// Each half of the step decays by `e^-x`, `x = dt R / 2L`, approximated by `1/(1 + x + x²/2)`; the mean of the decay over a half is
+/// approximated by `1/(1 + x/2)` (section 11 of `docs/derivation.md`). Error of the current: (dt R/L)²/24 of its remaining change
+/// (`blocked_motor_current`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conduction {
     current_a: f64,
-    omega_rad_s: f64,
-) -> f64 {
-    if !bridge.enabled {
-        return 0.0;
-    }
-    let mut port =
-        DrivePort { t_s, dt_s, current_a, duty: bridge.duty, resistance_ohm: motor.resistance_ohm };
-    if effects.touches(Component::Motor) {
-        effects.drive(states, &mut port);
-    }
-    let back_emf_v = pulley_torque_constant_nm_per_a(motor) * omega_rad_s;
-    let per_henry = dt_s / motor.inductance_h.max(1e-9);
-    // A step waits for what follows from the state, and a product takes a third of a division's time.
-    let decay = (1.0 + per_henry * port.resistance_ohm).recip();
-    (current_a + per_henry * (port.duty * bridge.bus_v - back_emf_v)) * decay
+    bridge_v: f64,
+    /// Half of the step over the inductance.
+    half_s_per_h: f64,
+    /// Mean of the decay over half a step.
+    mean: f64,
+    /// Current that a volt adds over half a step, before the decay, A/V.
+    rise_a_per_v: f64,
+    /// Decay over half a step.
+    decay: f64,
 }
 
-/// Speed after dry friction acted for `dt_s` on `inertia_kg_m2`, which builds up to `level_nm` over a turn of `travel_rad` > 0
-/// (Prandtl's element, solved with the speed at the end of the step). `presliding` is the part of the level that acts, -1 to 1.
+impl Conduction {
+    /// The step that begins at `t_s` with `current_a` in the winding.
+    #[must_use]
+    #[inline]
+    pub fn new(
+        motor: &MotorParameters,
+        effects: &EffectSet,
+        states: &mut EffectStates,
+        bridge: BridgeInput,
+        (t_s, dt_s): (f64, f64),
+        current_a: f64,
+    ) -> Self {
+        if !bridge.enabled {
+            return Self {
+                current_a: 0.0,
+                bridge_v: 0.0,
+                half_s_per_h: 0.0,
+                mean: 0.0,
+                rise_a_per_v: 0.0,
+                decay: 0.0,
+            };
+        }
+        let mut port =
+            DrivePort { t_s, dt_s, current_a, duty: bridge.duty, resistance_ohm: motor.resistance_ohm };
+        if effects.touches(Component::Motor) {
+            effects.drive(states, &mut port);
+        }
+        let half_s_per_h = 0.5 * dt_s / motor.inductance_h.max(1e-9);
+        let x = half_s_per_h * port.resistance_ohm;
+        // A step waits for what follows from the state, and a product takes a third of a division's time.
+        let (mean, decay) = ((1.0 + 0.5 * x).recip(), (1.0 + x * (1.0 + 0.5 * x)).recip());
+        let rise_a_per_v = half_s_per_h * (1.0 + 0.5 * x);
+        Self { current_a, bridge_v: port.duty * bridge.bus_v, half_s_per_h, mean, rise_a_per_v, decay }
+    }
+
+    /// Mean current over the first half of the step at standstill, A, and its reduction by a back-EMF, A/V.
+    #[must_use]
+    #[inline]
+    pub fn first_half_a(&self) -> [f64; 2] {
+        let a_per_v = 0.5 * self.half_s_per_h * self.mean;
+        [self.mean * self.current_a + a_per_v * self.bridge_v, a_per_v]
+    }
+
+    /// Mean current over the second half of the step and current after the step, A, with the back-EMF at the speed in the middle of the step.
+    #[must_use]
+    #[inline]
+    pub fn second_half_a(&self, back_emf_v: f64) -> [f64; 2] {
+        let volts = self.bridge_v - back_emf_v;
+        let middle_a = self.decay * (self.current_a + self.rise_a_per_v * volts);
+        let mean_a = self.mean * (middle_a + 0.5 * self.half_s_per_h * volts);
+        [mean_a, self.decay * (middle_a + self.rise_a_per_v * volts)]
+    }
+}
+
+/// Change of a speed by a torque τ and a drag b that act on an inertia I for `kick_s`: second order in that time, stable for every time.
+/// With `z = kick b/I`, `ω' = (ω + (1 + z/2) kick τ/I) / (1 + z + z²/2)` (section 11 of `docs/derivation.md`). Error of the decay: z³/6
+/// (`drag_slows_by_the_exponential`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Response {
+    /// Remaining part of the speed, 0 to 1.
+    pub kept: f64,
+    /// Change of the speed by a torque, rad/s per N·m.
+    pub rad_s_per_nm: f64,
+}
+
+impl Response {
+    /// For an inertia with two drags, N·m·s/rad: `drag` acts at the mean speed, `late` at the speed after `kick_s`.
+    #[must_use]
+    #[inline]
+    pub fn new(inertia_kg_m2: f64, [drag, late]: [f64; 2], kick_s: f64) -> Self {
+        let square = inertia_kg_m2 * inertia_kg_m2;
+        let eased = inertia_kg_m2 + 0.5 * kick_s * drag;
+        let share = (square + kick_s * (drag + late) * eased).recip();
+        Self { kept: square * share, rad_s_per_nm: kick_s * eased * share }
+    }
+
+    /// Speed after `torque_nm`.
+    #[must_use]
+    #[inline]
+    pub fn after_rad_s(&self, omega_rad_s: f64, torque_nm: f64) -> f64 {
+        self.kept * omega_rad_s + self.rad_s_per_nm * torque_nm
+    }
+}
+
+/// Speed after dry friction acted for `dt_s`, in which a torque changes the speed by `rad_s_per_nm`; friction builds up to `level_nm` over a turn of
+/// `travel_rad` > 0 (Prandtl's element, solved with the speed at the end of the step). `presliding` is the part of the level that acts, -1 to 1.
 #[must_use]
 pub fn after_elastic_friction_rad_s(
     presliding: &mut f64,
     omega_rad_s: f64,
     [level_nm, travel_rad]: [f64; 2],
-    inertia_kg_m2: f64,
+    rad_s_per_nm: f64,
     dt_s: f64,
 ) -> f64 {
-    let loss = level_nm * dt_s / inertia_kg_m2;
+    if level_nm == 0.0 {
+        return omega_rad_s;
+    }
+    let loss = level_nm * rad_s_per_nm;
     let per_speed = dt_s / travel_rad;
     let sticking_rad_s = (omega_rad_s - loss * *presliding) * (1.0 + loss * per_speed).recip();
     *presliding = (*presliding + per_speed * sticking_rad_s).clamp(-1.0, 1.0);

@@ -14,9 +14,11 @@
 //!
 //! Without tendons `plant/direct.rs` turns rotor, spindle and joint as one.
 //!
-//! Integration is semi-implicit Euler (speeds first, then angles): of first order in the step, without numerical
-//! damping, stable while `step · sqrt(stiffness / inertia) < 2`. [`PlantConfig::stable_step_s`] says which step that
-//! allows.
+//! Integration is the leapfrog (Störmer and Verlet; section 11 of `docs/derivation.md`): angles, tensions and the current are those at the ends of
+//! the steps, speeds those in their middle. Torques at the start of a step change the speed from the middle of the step before to the middle of
+//! this one; the first step changes it for half a step. The motor torque is the mean over that time, and drag acts at the mean speed. Second
+//! order in the step without dry friction and play, first order with them; no numerical damping; stable while
+//! `step · sqrt(stiffness / inertia) < 2` ([`PlantConfig::stable_step_s`]).
 
 mod config;
 mod direct;
@@ -41,6 +43,8 @@ pub use step_input::StepInput;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plant {
     t_s: f64,
+    /// Length of the previous step, s; zero at the start.
+    last_dt_s: f64,
     motor: Motor,
     spindle: Spindle,
     transmission: Option<Transmission>,
@@ -55,6 +59,7 @@ impl Plant {
         let direct = config.transmission().is_none();
         Self {
             t_s: 0.0,
+            last_dt_s: 0.0,
             motor: Motor::at_rest(theta_in_rad),
             spindle: Spindle::at_rest(theta_in_rad),
             transmission: config.transmission().map(Transmission::at_rest),
@@ -144,7 +149,8 @@ impl Plant {
 
     /// Advances by `dt_s`.
     pub fn step(&mut self, config: &PlantConfig, input: &StepInput, dt_s: f64) {
-        let step = Step { config, input, t_s: self.t_s, dt_s };
+        let step = Step { config, input, t_s: self.t_s, dt_s, kick_s: 0.5 * (self.last_dt_s + dt_s) };
+        self.last_dt_s = dt_s;
         let Self { motor, spindle, transmission, joint, states, .. } = self;
         if let (Some(cables), Some(parts)) = (transmission, config.transmission()) {
             let motion = PulleyMotion {
@@ -163,8 +169,11 @@ impl Plant {
             // moves would run ahead of the arm by a step and act as negative friction.
             let cable_nm = cables.torque_out_nm(parts);
             let before_rad = spindle.theta_rad;
-            let port = step_input_side(&step, states, (motor, spindle), (cables, parts), joint.omega_rad_s);
-            joint.step(&step, states, (cables, parts), cable_nm, spindle.omega_rad_s);
+            let before_rad_s = spindle.omega_rad_s;
+            let out_rad_s = joint.omega_now_rad_s();
+            let port = step_input_side(&step, states, (motor, spindle), (cables, parts), out_rad_s);
+            let in_rad_s = 0.5 * (before_rad_s + spindle.omega_rad_s);
+            joint.step(&step, states, (cables, parts), cable_nm, in_rad_s);
             if let Some(port) = port {
                 spindle.close_gear_play(&step, (cables, parts), &port, before_rad);
             }
@@ -238,24 +247,24 @@ fn step_input_side(
     omega_out_rad_s: f64,
 ) -> Option<MotorPort> {
     let parameters = step.config.parameters().motor.as_ref();
-    if let Some(parameters) = parameters {
-        motor.conduct(step, states, parameters);
-    }
-    match (step.config.input(), parameters) {
-        (InputBoundary::Motor, Some(parameters)) => {
-            let load_nm = spindle.load_nm(cables, parts, omega_out_rad_s);
-            let torques_nm = [load_nm, step.input.input_torque_nm];
-            let port = motor.accelerate(step, states, parameters, torques_nm, spindle.inside_gear_play);
+    let driven = parameters.map(|parameters| (parameters, motor.conduct(step, states, parameters)));
+    match (step.config.input(), driven) {
+        (InputBoundary::Motor, Some((parameters, conduction))) => {
+            let load = spindle.load(cables, parts, omega_out_rad_s, step.input.input_torque_nm);
+            let port =
+                motor.accelerate(step, states, parameters, &conduction, load, spindle.inside_gear_play);
+            motor.carry_current(parameters, &conduction);
             let delta_rad = step.dt_s * motor.omega_rad_s;
             motor.theta_rad += delta_rad;
             let turned = [motor.theta_rad, delta_rad];
             spindle.turn_with_rotor(step, (cables, parts), port.gear_play_rad, turned);
             Some(port)
         }
-        (_, parameters) => {
+        (_, driven) => {
             let delta_rad = spindle.turn_as_prescribed(step, cables, parts);
             let at = [spindle.theta_rad, spindle.omega_rad_s];
-            spindle.inside_gear_play = motor.follow(step, states, parameters, at, spindle.inside_gear_play);
+            let driven = driven.as_ref().map(|(parameters, conduction)| (*parameters, conduction));
+            spindle.inside_gear_play = motor.follow(step, states, driven, at, spindle.inside_gear_play);
             if parameters.is_none() && step.config.effects().touches(Component::Motor) {
                 spindle.rub(step, states, cables.torque_in_nm(parts), delta_rad);
             }

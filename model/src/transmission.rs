@@ -110,13 +110,11 @@ impl TransmissionConfig {
         self.pulleys.input_radius_m / self.pulleys.output_radius_m
     }
 
-    /// Torque on the joint from the internal friction of both ropes, N·m.
+    /// Torque on the joint from the internal friction of both ropes, N·m for each rad/s by which it lags the input.
     #[inline]
-    pub(crate) fn rope_loss_nm(&self, omega_in_rad_s: f64, omega_out_rad_s: f64) -> f64 {
+    pub(crate) fn rope_loss_nm_s_per_rad(&self) -> f64 {
         let radius_m = self.pulleys.output_radius_m;
-        let stiffness_nm_per_rad = 2.0 * radius_m * radius_m / self.mesh.total_compliance_m_per_n();
-        let lag_rad_s = self.pulley_ratio() * omega_in_rad_s - omega_out_rad_s;
-        ROPE_LOSS_S * stiffness_nm_per_rad * lag_rad_s
+        ROPE_LOSS_S * 2.0 * radius_m * radius_m / self.mesh.total_compliance_m_per_n()
     }
 
     fn nominal_tendon_port(&self) -> TendonPort {

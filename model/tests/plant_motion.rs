@@ -97,8 +97,8 @@ fn ring(dt_s: f64) -> (f64, f64) {
 }
 
 /// ω² = (2 k r² + m g l)/I; the rope loss adds the damping torque τ 2kr² ω, so the decay rate is σ = τ 2 k r²/2I and
-/// the ring has sqrt(ω² - σ²). Semi-implicit steps: the error of the frequency halves with the step, and the decay of 6.1 1/s
-/// is met to 1 %; a drag of -K ω dt would take 6 1/s from it at 0.5 ms.
+/// the ring has sqrt(ω² - σ²). The error of both falls with the square of the step, and the decay of 6.1 1/s is met to 0.1 % at 0.5 ms; a drag
+/// of -K ω dt would take 6 1/s from it.
 #[test]
 fn ring_has_the_frequency_and_decay_of_theory() {
     let decay_per_s = 0.5 * ROPE_LOSS_S * STIFFNESS_NM_PER_RAD / INERTIA_KG_M2;
@@ -108,10 +108,10 @@ fn ring_has_the_frequency_and_decay_of_theory() {
         let (frequency, decay) = ring(dt_s);
         (frequency / frequency_rad_s - 1.0, decay / decay_per_s - 1.0)
     });
-    near("frequency at 0.5 ms", errors[1].0, 0.0, 2.5e-3);
-    near("decay at 0.5 ms", errors[1].1, 0.0, 0.01);
+    near("frequency at 0.5 ms", errors[1].0, 0.0, 3e-4);
+    near("decay at 0.5 ms", errors[1].1, 0.0, 1e-3);
     for pair in errors.windows(2) {
-        assert!(pair[0].0.abs() > 1.8 * pair[1].0.abs(), "frequency: {errors:?}");
+        assert!(pair[0].0.abs() > 3.6 * pair[1].0.abs(), "frequency: {errors:?}");
     }
 }
 

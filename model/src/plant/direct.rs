@@ -5,7 +5,7 @@ use super::joint::Joint;
 use super::motor::{self, Motor};
 use super::spindle::Spindle;
 use super::step_input::Step;
-use crate::drive::{after_elastic_friction_rad_s, pulley_inertia_kg_m2};
+use crate::drive::{Response, after_elastic_friction_rad_s, pulley_inertia_kg_m2};
 use crate::effect_set::EffectStates;
 use crate::load::{inertia_kg_m2, weight_nm};
 use crate::parameters::LoadParameters;
@@ -18,32 +18,36 @@ pub(super) fn step(
     spindle: &mut Spindle,
     joint: &mut Joint,
 ) {
-    let Step { config, input, dt_s, .. } = *step;
+    let Step { config, input, dt_s, kick_s, .. } = *step;
     let Some(parameters) = &config.parameters.motor else { return };
-    motor.conduct(step, states, parameters);
+    let conduction = motor.conduct(step, states, parameters);
     if config.input == InputBoundary::Angle {
         let delta_rad = input.theta_in_rad - spindle.theta_rad;
         turn(motor, spindle, joint, [input.theta_in_rad, delta_rad / dt_s]);
+        motor.carry_current(parameters, &conduction);
         return;
     }
     let load = config.parameters.load.unwrap_or(LoadParameters::NONE);
     let at_joint = joint.port(step, states, load.mass_kg);
     let weight_nm = weight_nm(&load, at_joint.mass_kg, joint.theta_rad);
     let load_nm = weight_nm + at_joint.torque_nm + input.external_torque_nm;
-    let motor_nm = motor.torque_nm(parameters);
+    let [standing_nm, back_emf_drag] = motor.torque_nm(step, parameters, &conduction);
+    let motor_nm = standing_nm - back_emf_drag * motor.omega_rad_s;
     let carried_nm = motor_nm.abs().max(load_nm.abs());
     let at = [motor.theta_rad, motor.omega_rad_s];
     let port = motor::port(step, states, at, [motor_nm, load_nm, carried_nm]);
     let inertia = pulley_inertia_kg_m2(parameters) + inertia_kg_m2(&load, at_joint.mass_kg);
-    let viscous = parameters.viscous_nm_s_per_rad + load.viscous_nm_s_per_rad;
-    let slowed = inertia + dt_s * viscous;
-    let torque_nm = motor_nm + load_nm + port.torque_nm;
-    let driven = (inertia * motor.omega_rad_s + dt_s * torque_nm) / slowed;
+    let drag = parameters.viscous_nm_s_per_rad + load.viscous_nm_s_per_rad;
+    let response = Response::new(inertia, [drag, back_emf_drag], kick_s);
+    let torque_nm = standing_nm + load_nm + port.torque_nm;
+    let driven = response.after_rad_s(motor.omega_rad_s, torque_nm);
+    let per_nm = response.rad_s_per_nm;
     let friction = [port.coulomb_nm, port.presliding_rad];
-    let rubbed = after_elastic_friction_rad_s(&mut motor.presliding, driven, friction, slowed, dt_s);
+    let rubbed = after_elastic_friction_rad_s(&mut motor.presliding, driven, friction, per_nm, kick_s);
     let friction = [at_joint.coulomb_nm, at_joint.presliding_rad];
-    let omega_rad_s = after_elastic_friction_rad_s(&mut joint.presliding, rubbed, friction, slowed, dt_s);
+    let omega_rad_s = after_elastic_friction_rad_s(&mut joint.presliding, rubbed, friction, per_nm, kick_s);
     turn(motor, spindle, joint, [motor.theta_rad + dt_s * omega_rad_s, omega_rad_s]);
+    motor.carry_current(parameters, &conduction);
 }
 
 /// All three at one angle and speed, rad and rad/s.

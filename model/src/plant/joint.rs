@@ -2,7 +2,7 @@
 
 use super::config::{OutputBoundary, PlantConfig};
 use super::step_input::Step;
-use crate::drive::after_elastic_friction_rad_s;
+use crate::drive::{Response, after_elastic_friction_rad_s};
 use crate::effect::{Component, JointPort, PRESLIDING_RAD};
 use crate::effect_set::EffectStates;
 use crate::load::{inertia_kg_m2, weight_nm};
@@ -16,8 +16,10 @@ use crate::transmission::{Outside, Transmission, TransmissionConfig};
 pub(super) struct Joint {
     /// Angle, rad.
     pub theta_rad: f64,
-    /// Speed, rad/s.
+    /// Speed in the middle of the last step, rad/s.
     pub omega_rad_s: f64,
+    /// Change of the speed by that step, rad/s; zero without inertia.
+    gained_rad_s: f64,
     /// Part of the dry friction that acts, -1 to 1.
     pub presliding: f64,
     /// Of the output pulley before the arm.
@@ -27,7 +29,13 @@ pub(super) struct Joint {
 impl Joint {
     /// At rest in the middle of the play.
     pub const fn at_rest(theta_rad: f64) -> Self {
-        Self { theta_rad, omega_rad_s: 0.0, presliding: 0.0, play: Play::CENTRED }
+        Self { theta_rad, omega_rad_s: 0.0, gained_rad_s: 0.0, presliding: 0.0, play: Play::CENTRED }
+    }
+
+    /// Speed at the end of the last step, rad/s, extrapolated.
+    #[inline]
+    pub fn omega_now_rad_s(&self) -> f64 {
+        self.omega_rad_s + 0.5 * self.gained_rad_s
     }
 
     /// What effects say of the joint.
@@ -60,11 +68,13 @@ impl Joint {
         cable_nm: f64,
         omega_in_rad_s: f64,
     ) {
-        let Step { config, input, dt_s, .. } = *step;
+        let Step { config, input, dt_s, kick_s, .. } = *step;
+        let before_rad_s = self.omega_rad_s;
         if config.output == OutputBoundary::Angle {
             let delta_rad = input.theta_out_rad - self.theta_rad;
             self.theta_rad = input.theta_out_rad;
             self.omega_rad_s = delta_rad / dt_s;
+            self.gained_rad_s = self.omega_rad_s - before_rad_s;
             cables.turn_output(parts, delta_rad);
             cables.close_play(parts);
             return;
@@ -73,22 +83,26 @@ impl Joint {
         let port = self.port(step, states, load.mass_kg);
         let inside_play = self.play.is_open(port.play_rad) || cables.inside_play();
         // A joint without inertia cannot ring; there the speed of the last correction would only feed back into the next.
-        let loss_nm = if inside_play || config.output == OutputBoundary::Torque {
+        let loss = if inside_play || config.output == OutputBoundary::Torque {
             0.0
         } else {
-            parts.rope_loss_nm(omega_in_rad_s, self.omega_rad_s)
+            parts.rope_loss_nm_s_per_rad()
         };
+        let loss_nm = loss * parts.pulley_ratio() * omega_in_rad_s;
         let outside_nm = loss_nm + input.external_torque_nm + port.torque_nm;
         if config.output == OutputBoundary::Arm {
             let torque_nm = cable_nm + outside_nm;
             let inertia = inertia_kg_m2(&load, port.mass_kg);
             let weight_nm = weight_nm(&load, port.mass_kg, self.theta_rad);
-            // Viscous friction at the end of the step counts like inertia.
-            let slowed = inertia + dt_s * load.viscous_nm_s_per_rad;
-            let driven = (inertia * self.omega_rad_s + dt_s * (torque_nm + weight_nm)) * slowed.recip();
-            let friction = [port.coulomb_nm, port.presliding_rad];
-            self.omega_rad_s =
-                after_elastic_friction_rad_s(&mut self.presliding, driven, friction, slowed, dt_s);
+            let response = Response::new(inertia, [load.viscous_nm_s_per_rad + loss, 0.0], kick_s);
+            self.omega_rad_s = after_elastic_friction_rad_s(
+                &mut self.presliding,
+                response.after_rad_s(before_rad_s, torque_nm + weight_nm),
+                [port.coulomb_nm, port.presliding_rad],
+                response.rad_s_per_nm,
+                kick_s,
+            );
+            self.gained_rad_s = self.omega_rad_s - before_rad_s;
             let delta_rad = dt_s * self.omega_rad_s;
             self.theta_rad += delta_rad;
             // An arm that goes back lets the pulley lead. The pulley has no inertia, so that the arm loses no speed where the play

@@ -1,6 +1,6 @@
 //! Stage 2, rotor to input pulley: the spindle behind the gear, with its play, and what the cables hand back to the motor.
 
-use super::motor;
+use super::motor::{self, Load};
 use super::step_input::Step;
 use crate::effect::MotorPort;
 use crate::effect_set::EffectStates;
@@ -38,14 +38,24 @@ impl Spindle {
         }
     }
 
-    /// Torque of the cables on the rotor, N·m: none inside a play of gear or pulley.
+    /// Torque of the cables on the rotor and one from outside: of the cables none inside a play of gear or pulley.
     #[inline]
-    pub fn load_nm(&self, cables: &Transmission, parts: &TransmissionConfig, omega_out_rad_s: f64) -> f64 {
+    pub fn load(
+        &self,
+        cables: &Transmission,
+        parts: &TransmissionConfig,
+        omega_out_rad_s: f64,
+        outside_nm: f64,
+    ) -> Load {
         if self.inside_gear_play || cables.inside_play() {
-            0.0
-        } else {
-            -cables.torque_in_nm(parts)
-                - parts.rope_loss_nm(self.omega_rad_s, omega_out_rad_s) * parts.pulley_ratio()
+            return Load { outside_nm, ..Load::NOTHING };
+        }
+        let ratio = parts.pulley_ratio();
+        let loss = ratio * parts.rope_loss_nm_s_per_rad();
+        Load {
+            cables_nm: loss * omega_out_rad_s - cables.torque_in_nm(parts),
+            drag_nm_s_per_rad: loss * ratio,
+            outside_nm,
         }
     }
 

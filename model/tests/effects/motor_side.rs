@@ -91,7 +91,7 @@ fn presliding_takes_its_turn_from_the_work_of_a_stroke() {
                 &mut presliding,
                 step_rad / 1e-3,
                 [level_nm, travel_rad],
-                1e9,
+                1e-12,
                 1e-3,
             );
             near("speed", speed_rad_s, step_rad / 1e-3, 1e-9);
