@@ -39,7 +39,6 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::law;
 
-use crate::fit::free::Free;
 use crate::fit::objective::{Objective, Part, Series};
 use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::variation::Variation;
@@ -230,8 +229,7 @@ impl Case<'_> {
         let refined =
             |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
         let mut last = refined(&selected.model)?;
-        while let Some(fewer) =
-            selected.complete.then(|| selected.without_faded(objective, &last.model)).flatten()
+        while let Some(fewer) = selected.complete.then(|| selected.without_faded(objective, &last)).flatten()
         {
             selected = fewer;
             last = refined(&selected.model)?;
@@ -407,7 +405,6 @@ impl Case<'_> {
             .collect();
         let own = model.effects.len();
         let clock_s = objective.duration_s();
-        let mut first_value = nominal.len();
         let shown = Shown::by(training);
         let bearable = Bearable { shown, allowed: self.allowed, scales: objective.scales() };
         let mut experiments = Vec::new();
@@ -415,9 +412,7 @@ impl Case<'_> {
         let mut laws = Vec::new();
         for (index, chosen) in selected.chosen.iter().enumerate() {
             let active = last.model.effects[own + index];
-            let count = Free::of_effect(&last.model, own + index).len();
-            let values = first_value..first_value + count;
-            first_value += Layout::of_found(&last.model, own + index).len();
+            let values = Layout::of(model).values_of_found(&last.model, index);
             let heldout = self.heldout_losses(chosen)?;
             if let Some(law) = law::of(&active) {
                 let improvement = improvement([chosen.loss_before, chosen.loss_after]);

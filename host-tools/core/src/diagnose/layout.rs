@@ -6,6 +6,7 @@
 //! search therefore carries them along at ordinary size, fits them, and names nothing for them: what they take off can no
 //! longer hide a weak effect, nor be mistaken for one. The diagnosed rig does not contain them.
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use bowden_model::drive::pulley_stall_torque_nm;
@@ -172,6 +173,14 @@ impl Layout {
     /// Parameters of the rig's own effects that single benches have for themselves.
     fn stated(&self, model: &JointModel) -> Vec<Free> {
         (0..self.own).flat_map(|effect| own_of_effect(model, effect)).collect()
+    }
+
+    /// Places, among the parameters of [`Self::free`], of the shared parameters of the found effect `index`.
+    pub(super) fn values_of_found(&self, model: &JointModel, index: usize) -> Range<usize> {
+        let found = self.first_found();
+        let others: usize = (found..found + index).map(|effect| Self::of_found(model, effect).len()).sum();
+        let first = self.calibrated(model).len() + self.ordinary.len() + others;
+        first..first + Free::of_effect(model, found + index).len()
     }
 
     /// Parameters of a found effect, shared ones first.

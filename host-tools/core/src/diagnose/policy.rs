@@ -15,6 +15,9 @@ pub struct Policy {
     /// `nothing` and `parameters`) candidates reduce it by up to 0.04 (`search` in each `diagnosis.json`), with two exceptions:
     /// `sheath_stribeck_friction`, up to 0.27, and one bench, up to 0.20, whose diagnosed rig would not fit better.
     pub name_loss: f64,
+    /// Minimum absolute reduction of the loss where the effect acts least: above the 0.04 of those candidates. An effect that begins at a
+    /// moment is chosen from all moments of the recordings and must reach `name_loss` there as well.
+    pub elsewhere_loss: f64,
     /// Loss above which the residual is far beyond noise and bench tolerances: every residual is beyond the three noise scales at which the
     /// loss function changes from quadratic to linear.
     pub much_left: f64,
@@ -30,6 +33,8 @@ pub struct Policy {
     pub paying_share: f64,
     /// Minimum deviation of a parameter from the rig file, in standard deviations, for it to be reported as wrong.
     pub sure_stds: f64,
+    /// Half of the 90 % interval of a normally distributed value, in standard deviations.
+    pub interval_stds: f64,
     /// Exponent that turns a ratio of losses into odds: at 10, a candidate whose loss is 20 % higher is six times less likely.
     pub odds_per_loss_ratio: f64,
     /// Minimum odds for a rival to be listed.
@@ -42,12 +47,14 @@ pub struct Policy {
 pub const POLICY: Policy = Policy {
     name_share: 0.15,
     name_loss: 0.1,
+    elsewhere_loss: 0.05,
     much_left: 10.0,
     share_per_parameter: 0.03,
     law_share: 0.3,
     law_loss: 0.4,
     paying_share: 0.05,
     sure_stds: 3.0,
+    interval_stds: 1.645,
     odds_per_loss_ratio: 10.0,
     listed_odds: 0.03,
     even_improvement: 0.1,
@@ -74,8 +81,9 @@ impl Policy {
     /// Whether a named effect also reduces the loss where it acts least. A saturated sensor or an end stop is inactive most of the time, so
     /// that a small reduction is enough there; with a remaining loss above `much_left` it is not, because it may be an imitation.
     #[must_use]
-    pub fn shows_elsewhere(&self, before: f64, after: f64) -> bool {
-        before - after > self.name_loss && self.pays(before, after) && after <= self.much_left
+    pub fn shows_elsewhere(&self, before: f64, after: f64, begins_at_a_moment: bool) -> bool {
+        let least = if begins_at_a_moment { self.name_loss } else { self.elsewhere_loss };
+        before - after > least && self.pays(before, after) && after <= self.much_left
     }
 
     /// Whether `instances` further instances of a named effect, such as harmonics of cogging, are kept.
@@ -97,12 +105,25 @@ impl Policy {
         recalibrated - diagnosed > self.paying_share * recalibrated
     }
 
+    /// Whether a difference between a fitted value and a stated one, or zero, exceeds the uncertainty of the fit; without a standard
+    /// deviation it counts as doing so.
+    #[must_use]
+    pub fn is_sure(&self, difference: f64, std: Option<f64>) -> bool {
+        std.is_none_or(|std| difference.abs() > self.sure_stds * std)
+    }
+
     /// Factor on the loss of a candidate in comparisons: it grows with the number of parameters, and by `name_share` for a form that is not
     /// the usual one.
     #[must_use]
     pub fn handicap(&self, parameters: usize, is_usual_form: bool) -> f64 {
         let share = if is_usual_form { 0.0 } else { self.name_share };
         (1.0 + self.share_per_parameter * parameters as f64) / (1.0 - share)
+    }
+
+    /// Whether the 90 % interval of a fitted value contains zero.
+    #[must_use]
+    pub fn may_be_zero(&self, value: f64, std: f64) -> bool {
+        value.abs() < self.interval_stds * std
     }
 
     /// Odds of a candidate whose loss is `loss_ratio` times that of the named effect.
@@ -176,9 +197,12 @@ mod tests {
     /// eighth. What a single moment asks for takes nothing off elsewhere.
     #[test]
     fn what_is_idle_most_of_the_time_has_to_show_elsewhere_and_no_more() {
-        assert!(!POLICY.worth_naming(3.52, 3.07) && POLICY.shows_elsewhere(3.52, 3.07));
-        for (before, after) in [(3.52, 3.4), (0.5, 0.41), (3.5, 3.6), (80.0, 70.0)] {
-            assert!(!POLICY.shows_elsewhere(before, after), "{before} to {after}");
+        assert!(!POLICY.worth_naming(3.52, 3.07) && POLICY.shows_elsewhere(3.52, 3.07, true));
+        for (before, after) in [(3.52, 3.4), (0.5, 0.46), (3.5, 3.6), (80.0, 70.0)] {
+            assert!(!POLICY.shows_elsewhere(before, after, false), "{before} to {after}");
+        }
+        for begins_at_a_moment in [false, true] {
+            assert_eq!(POLICY.shows_elsewhere(0.5, 0.42, begins_at_a_moment), !begins_at_a_moment);
         }
     }
 

@@ -27,6 +27,7 @@ use rayon::prelude::*;
 use super::hypotheses::Asked;
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
+use super::onset::moment_of;
 use super::policy::{POLICY, Policy};
 use crate::fit::objective::{Objective, Part, StretchLosses};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
@@ -155,27 +156,31 @@ impl Selected {
     }
 
     /// The same search without the effects that are negligible in `fitted`, the fit to `objective` at the rig's own resolution; `None` if
-    /// none is. An effect whose remainder is another effect of the catalogue is replaced by that.
+    /// none is. An effect whose remainder is another effect of the catalogue is replaced by that, also if the 90 % interval of its strength
+    /// contains zero.
     ///
     /// The search simulates coarsely, and an effect may only compensate the discretisation error: a spring of a few mN·m/rad was ten times as
     /// strong there.
     #[must_use]
-    pub fn without_faded(&self, objective: &Objective, fitted: &JointModel) -> Option<Self> {
+    pub fn without_faded(&self, objective: &Objective, fitted: &Solution) -> Option<Self> {
         let believed = &self.baseline.model;
-        let own = believed.effects.len();
+        let layout = Layout::of(believed);
         let mut left = self.clone();
         for index in (0..self.chosen.len()).rev() {
-            let effect = &fitted.effects[own + index];
-            if !negligible(objective, believed, effect) {
+            let place = layout.first_found() + index;
+            let effect = &fitted.model.effects[place];
+            let remainder = remainder(believed, effect);
+            let std = fitted.stds.get(layout.values_of_found(&fitted.model, index).start).copied().flatten();
+            let may_be_zero = std.is_some_and(|std| POLICY.may_be_zero(effect.parameters[0], std));
+            if !negligible(objective, believed, effect) && !(may_be_zero && remainder.is_some()) {
                 continue;
             }
-            let remainder = remainder(believed, effect);
             if let Some(other) = remainder.filter(|other| !negligible(objective, believed, other)) {
-                left.model.effects[own + index] = other;
+                left.model.effects[place] = other;
                 left.chosen[index].becomes(other);
             } else {
                 left.chosen.remove(index);
-                left.model.effects.remove(own + index);
+                left.model.effects.remove(place);
             }
         }
         (left.model != self.model).then_some(left)
@@ -301,8 +306,9 @@ impl Fitted {
     /// effect of the catalogue at all, a law by the same threshold, because one of its many forms can fit a few moments by chance.
     fn shows(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
         let is_law = law::of(effect).is_some();
+        let begins_at_a_moment = moment_of(effect).is_some();
         let elsewhere = |[without, with]: &[f64; 2]| {
-            worth(*without, *with) || !is_law && POLICY.shows_elsewhere(*without, *with)
+            worth(*without, *with) || !is_law && POLICY.shows_elsewhere(*without, *with, begins_at_a_moment)
         };
         let quieter = without_the_loudest(&before.stretch_losses, &self.stretch_losses);
         worth(before.loss, self.loss) && quieter.iter().all(elsewhere)

@@ -120,8 +120,8 @@ impl Recalibrated {
     /// Whether the rig file is wrong about it, and not just by what benches usually are.
     #[must_use]
     pub fn is_wrong(&self) -> bool {
-        let is_sure = self.std.is_none_or(|std| (self.fitted - self.nominal).abs() > POLICY.sure_stds * std);
-        is_sure && self.change().abs() > wrong_from(&self.parameter)
+        POLICY.is_sure(self.fitted - self.nominal, self.std)
+            && self.change().abs() > wrong_from(&self.parameter)
     }
 }
 

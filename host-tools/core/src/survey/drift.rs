@@ -40,8 +40,8 @@ impl Drift {
     /// Whether the change is sure, and as large as an error of the rig file would have to be to be reported.
     #[must_use]
     pub fn drifts(&self) -> bool {
-        let sure = (self.last - self.first).abs() > POLICY.sure_stds * self.change_std;
-        sure && self.change().abs() > wrong_from(&self.parameter)
+        POLICY.is_sure(self.last - self.first, Some(self.change_std))
+            && self.change().abs() > wrong_from(&self.parameter)
     }
 
     /// The line through points, by weighted least squares: `y = a + b x`, weights `1 / std^2`; standard deviations grow with the scatter

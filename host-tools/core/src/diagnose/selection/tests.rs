@@ -33,7 +33,7 @@ fn nothing_found(bench: &JointModel) -> Selected {
     }
 }
 
-/// Friction whose excess at a crawl is a sixth of what is left at speed is dry friction; where hardly any of either is there, nothing is left.
+/// Friction whose excess at a crawl is a sixth of what is left at speed, or may be zero, is dry friction; where hardly any of either is there, nothing is left.
 #[test]
 fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
     let recording = test_bench::swung(2000);
@@ -60,15 +60,25 @@ fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
         }],
         ..nothing_found(&bench)
     };
-    assert!(selected.without_faded(&objective, &with(falling(0.5, 0.07))).is_none());
-    let left = selected.without_faded(&objective, &with(falling(0.026, 0.159))).unwrap();
+    let calibrated = Layout::of(&bench).calibrated(&bench).len();
+    let left_of = |excess_nm: f64, coulomb_nm: f64, excess_std_nm: f64| {
+        let mut stds = vec![Some(1e9); calibrated];
+        stds.extend([Some(excess_std_nm), Some(1e9), Some(1e9)]);
+        let model = with(falling(excess_nm, coulomb_nm));
+        selected.without_faded(&objective, &Solution { model, stds, ..nothing_found(&bench).baseline })
+    };
+    assert!(left_of(0.5, 0.07, 0.3).is_none());
+    // The 90 % interval contains zero from a standard deviation of 0.304 on.
+    let unsure = left_of(0.5, 0.07, 0.305).unwrap();
+    assert_eq!(unsure.model.effects[0].descriptor().id, "motor_coulomb_friction");
+    let left = left_of(0.026, 0.159, 1e-3).unwrap();
     let [dry] = left.model.effects[..] else { panic!("{:?}", left.model.effects) };
     assert_eq!((dry.descriptor().id, dry.parameters[0]), ("motor_coulomb_friction", 0.159));
     let [chosen] = &left.chosen[..] else { panic!("{:?}", left.chosen) };
     assert_eq!((chosen.effect, &chosen.model, &chosen.compared[1]), (dry, &with(dry), &with(dry)));
     let ids: Vec<&str> = chosen.others.iter().map(|tried| tried.effect.descriptor().id).collect();
     assert_eq!(ids, ["gear_load_friction"]);
-    let left = selected.without_faded(&objective, &with(falling(1e-4, 1e-4))).unwrap();
+    let left = left_of(1e-4, 1e-4, 1e-6).unwrap();
     assert!(left.chosen.is_empty() && left.model.effects.is_empty());
 }
 
