@@ -172,7 +172,8 @@ impl Selected {
             let remainder = remainder(believed, effect);
             let std = fitted.stds.get(layout.values_of_found(&fitted.model, index).start).copied().flatten();
             let may_be_zero = std.is_some_and(|std| POLICY.may_be_zero(effect.parameters[0], std));
-            if !negligible(objective, believed, effect) && !(may_be_zero && remainder.is_some()) {
+            let only_the_remainder = may_be_zero && remainder.is_some();
+            if !negligible(objective, believed, effect) && !only_the_remainder {
                 continue;
             }
             if let Some(other) = remainder.filter(|other| !negligible(objective, believed, other)) {
