@@ -58,6 +58,10 @@ pub struct Conduction {
 }
 
 impl Conduction {
+    /// No current flows through a bridge that is off.
+    const OPEN: Self =
+        Self { current_a: 0.0, bridge_v: 0.0, half_s_per_h: 0.0, mean: 0.0, rise_a_per_v: 0.0, decay: 0.0 };
+
     /// The step that begins at `t_s` with `current_a` in the winding.
     #[must_use]
     #[inline]
@@ -70,14 +74,7 @@ impl Conduction {
         current_a: f64,
     ) -> Self {
         if !bridge.enabled {
-            return Self {
-                current_a: 0.0,
-                bridge_v: 0.0,
-                half_s_per_h: 0.0,
-                mean: 0.0,
-                rise_a_per_v: 0.0,
-                decay: 0.0,
-            };
+            return Self::OPEN;
         }
         let mut port =
             DrivePort { t_s, dt_s, current_a, duty: bridge.duty, resistance_ohm: motor.resistance_ohm };

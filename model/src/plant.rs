@@ -68,7 +68,7 @@ impl Plant {
         }
     }
 
-    /// Gives the joint a speed, rad/s, for runs that do not start at rest.
+    /// Gives the joint a speed, rad/s, before the first step of a run that does not start at rest.
     pub fn set_speed_rad_s(&mut self, omega_rad_s: f64) {
         self.motor.omega_rad_s = omega_rad_s;
         self.spindle.omega_rad_s = omega_rad_s;

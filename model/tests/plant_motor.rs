@@ -20,6 +20,9 @@ use near::near;
 
 const MOTOR_AND_ARM: (InputBoundary, OutputBoundary) = (InputBoundary::Motor, OutputBoundary::Arm);
 
+/// Torque of a stretch rate over that of a stretch in both ropes, s.
+const ROPE_LOSS_S: f64 = 5e-4;
+
 fn bare_motor() -> JointParameters {
     JointParameters {
         motor: Some(MOTOR),
@@ -88,57 +91,116 @@ fn drag_slows_by_the_exponential() {
     assert!(long.kept > 0.0 && long.kept < 1e-11, "{long:?}");
 }
 
-/// Motor with the weight on its shaft, by classic Runge-Kutta with a step of 10 µs.
-fn pendulum(until_s: f64, duty: impl Fn(f64) -> f64) -> [f64; 3] {
-    let h = 1e-5;
-    let slope = |t: f64, [current, theta, omega]: [f64; 3]| {
-        [
-            (duty(t) * 24.0 - 2.0 * current - PULLEY_NM_PER_A * omega) / 1e-3,
-            omega,
-            (PULLEY_NM_PER_A * current - 0.024 * omega - WEIGHT_NM * theta.sin())
-                / (PULLEY_INERTIA_KG_M2 + INERTIA_KG_M2),
-        ]
-    };
-    let ahead = |at: [f64; 3], k: [f64; 3], h: f64| [at[0] + h * k[0], at[1] + h * k[1], at[2] + h * k[2]];
-    let mut at = [0.0; 3];
-    for step in 0..(until_s / h).round() as usize {
+/// Solution at `until_s` from zero, by classic Runge-Kutta with steps of 10 µs.
+fn runge_kutta<const N: usize>(until_s: f64, slope: impl Fn(f64, [f64; N]) -> [f64; N]) -> [f64; N] {
+    let steps = (until_s / 1e-5).round();
+    let h = until_s / steps;
+    let ahead = |at: [f64; N], k: [f64; N], h: f64| std::array::from_fn(|i| at[i] + h * k[i]);
+    let mut at = [0.0; N];
+    for step in 0..steps as usize {
         let t = h * step as f64;
         let k1 = slope(t, at);
         let k2 = slope(t + 0.5 * h, ahead(at, k1, 0.5 * h));
         let k3 = slope(t + 0.5 * h, ahead(at, k2, 0.5 * h));
         let k4 = slope(t + h, ahead(at, k3, h));
-        for i in 0..3 {
+        for i in 0..N {
             at[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
         }
     }
     at
 }
 
-/// A motor that swings the weight directly: second order in the step against Runge-Kutta, angle and current at the end of a step and the
-/// speed in its middle.
+/// Slope of the current, A/s, at a duty and a speed of the rotor.
+fn current_slope(duty: f64, current_a: f64, omega_rad_s: f64) -> f64 {
+    (duty * 24.0 - 2.0 * current_a - PULLEY_NM_PER_A * omega_rad_s) / 1e-3
+}
+
+/// Motor with the weight on its shaft: current, angle, speed.
+fn pendulum(until_s: f64, duty: impl Fn(f64) -> f64) -> [f64; 3] {
+    runge_kutta(until_s, |t, [current, theta, omega]| {
+        let torque_nm = PULLEY_NM_PER_A * current - 0.024 * omega - WEIGHT_NM * theta.sin();
+        [current_slope(duty(t), current, omega), omega, torque_nm / (PULLEY_INERTIA_KG_M2 + INERTIA_KG_M2)]
+    })
+}
+
+/// Motor, elastic tendons without friction, and arm: current, angles of arm and rotor, speeds of both.
+fn elastic_joint(until_s: f64, duty: impl Fn(f64) -> f64) -> [f64; 5] {
+    let stiffness_nm_per_rad = 2.0 * STIFFNESS_N_PER_M * RADIUS_M * RADIUS_M;
+    runge_kutta(until_s, |t, [current, arm, rotor, arm_rad_s, rotor_rad_s]| {
+        let cable_nm = stiffness_nm_per_rad * (rotor - arm + ROPE_LOSS_S * (rotor_rad_s - arm_rad_s));
+        let rotor_nm = PULLEY_NM_PER_A * current - 0.02 * rotor_rad_s - cable_nm;
+        let arm_nm = cable_nm - 0.004 * arm_rad_s - WEIGHT_NM * arm.sin();
+        [
+            current_slope(duty(t), current, rotor_rad_s),
+            arm_rad_s,
+            rotor_rad_s,
+            arm_nm / INERTIA_KG_M2,
+            rotor_nm / PULLEY_INERTIA_KG_M2,
+        ]
+    })
+}
+
+/// Errors of the current, the angle of the arm and its speed after 1.5 s, with steps of `dt_s` or, as long on average, of half and one and
+/// a half of it in turn. `want` is the solution at a time: current, angle, speed.
+fn errors_of_steps(
+    parameters: JointParameters,
+    drive: impl Fn(f64) -> f64,
+    want: impl Fn(f64) -> [f64; 3],
+    [dt_s, uneven]: [f64; 2],
+) -> [f64; 3] {
+    let mut run = Run::new(parameters, &[], MOTOR_AND_ARM, dt_s);
+    let mut last_s = 0.0;
+    for step in 0..(1.5 / dt_s).round() as usize {
+        last_s = dt_s * if step % 2 == 0 { 1.0 - uneven } else { 1.0 + uneven };
+        // A duty that is held through a step is the one in its middle.
+        run.plant.step(&run.config, &duty(drive(run.plant.t_s() + 0.5 * last_s)), last_s);
+    }
+    let [current_a, theta_rad, _] = want(1.5);
+    // Speeds are those in the middle of a step.
+    let [_, _, omega_rad_s] = want(1.5 - 0.5 * last_s);
+    [
+        (run.plant.current_a() - current_a).abs(),
+        (run.plant.theta_out_rad() - theta_rad).abs(),
+        (run.plant.omega_out_rad_s() - omega_rad_s).abs(),
+    ]
+}
+
+/// Of second order in the step, even or not: a fifth of the step, at least a twelfth of the error.
+#[track_caller]
+fn assert_second_order(errors: impl Fn([f64; 2]) -> [f64; 3], allowed_at_1_ms: [f64; 3]) {
+    for uneven in [0.0, 0.5] {
+        let [coarse, fine] = [1e-3, 2e-4].map(|dt_s| errors([dt_s, uneven]));
+        for i in 0..3 {
+            assert!(uneven > 0.0 || coarse[i] < allowed_at_1_ms[i], "{coarse:?}");
+            assert!(coarse[i] > 12.0 * fine[i], "not of second order at {uneven}: {coarse:?}, {fine:?}");
+        }
+    }
+}
+
+/// A motor that swings the weight directly.
 #[test]
 fn direct_pendulum_converges_to_runge_kutta() {
     let mut parameters = bare_motor();
     parameters.load = joint(0.0).load;
-    let drive = |t: f64| 0.08 * (7.0 * t).sin();
-    let want = pendulum(1.5, drive);
-    let errors = [1e-3, 5e-4, 2e-4].map(|dt_s| {
-        let mut run = Run::new(parameters, &[], MOTOR_AND_ARM, dt_s);
-        // A duty that is held through a step is the one in its middle.
-        run.until(1.5, |t| duty(drive(t - 0.5 * dt_s)));
-        [
-            (run.plant.theta_out_rad() - want[1]).abs(),
-            (run.plant.omega_out_rad_s() - pendulum(1.5 - 0.5 * dt_s, drive)[2]).abs(),
-            (run.plant.current_a() - want[0]).abs(),
-        ]
-    });
-    assert!(errors[0][0] < 1e-5 && errors[0][1] < 1e-4 && errors[0][2] < 1e-4, "{errors:?} from {want:?}");
-    for i in 0..3 {
-        assert!(errors[0][i] > 12.0 * errors[2][i], "not of second order: {errors:?}");
-    }
+    let drive = |t: f64| 0.08 * (7.0 * t).cos();
+    assert_second_order(
+        |steps| errors_of_steps(parameters, drive, |t| pendulum(t, drive), steps),
+        [1e-4, 1e-5, 1e-4],
+    );
 }
 
-/// Dry friction of the motor: below breakaway it gives way by no more than its presliding turn, and slides above.
+/// A motor that swings the arm by elastic tendons, which lose in themselves.
+#[test]
+fn elastic_joint_converges_to_runge_kutta() {
+    let parameters = JointParameters { motor: bare_motor().motor, ..joint(0.0) };
+    let drive = |t: f64| 0.05 * (7.0 * t).cos();
+    let want = |t| {
+        let [current_a, arm_rad, _, arm_rad_s, _] = elastic_joint(t, drive);
+        [current_a, arm_rad, arm_rad_s]
+    };
+    assert_second_order(|steps| errors_of_steps(parameters, drive, want, steps), [5e-5, 1e-5, 5e-5]);
+}
+
 #[test]
 fn motor_friction_holds_below_breakaway() {
     let dry = ActiveEffect::with_defaults(effects::find("motor_coulomb_friction").unwrap());

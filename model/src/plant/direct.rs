@@ -31,7 +31,7 @@ pub(super) fn step(
     let at_joint = joint.port(step, states, load.mass_kg);
     let weight_nm = weight_nm(&load, at_joint.mass_kg, joint.theta_rad);
     let load_nm = weight_nm + at_joint.torque_nm + input.external_torque_nm;
-    let [standing_nm, back_emf_drag] = motor.torque_nm(step, parameters, &conduction);
+    let [standing_nm, back_emf_drag] = motor.torque_and_drag(step, parameters, &conduction);
     let motor_nm = standing_nm - back_emf_drag * motor.omega_rad_s;
     let carried_nm = motor_nm.abs().max(load_nm.abs());
     let at = [motor.theta_rad, motor.omega_rad_s];

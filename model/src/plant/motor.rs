@@ -57,10 +57,9 @@ impl Motor {
         )
     }
 
-    /// Torque of the mean current since the middle of the step before, at the input pulley, `k_t N i`: N·m at standstill, and the drag of the
-    /// back-EMF, N·m·s/rad.
+    /// Torque of the mean current over `kick_s` at the input pulley, `k_t N i`: at standstill, N·m, and the drag of the back-EMF, N·m·s/rad.
     #[inline]
-    pub fn torque_nm(&self, step: &Step, motor: &MotorParameters, conduction: &Conduction) -> [f64; 2] {
+    pub fn torque_and_drag(&self, step: &Step, motor: &MotorParameters, conduction: &Conduction) -> [f64; 2] {
         let constant = pulley_torque_constant_nm_per_a(motor);
         let share = step.share_of_kick();
         let [early_a, early_a_per_v] = conduction.first_half_a();
@@ -91,7 +90,7 @@ impl Motor {
         load: Load,
         inside_gear_play: bool,
     ) -> MotorPort {
-        let [motor_nm, back_emf_drag] = self.torque_nm(step, motor, conduction);
+        let [motor_nm, back_emf_drag] = self.torque_and_drag(step, motor, conduction);
         let load_nm = load.cables_nm - load.drag_nm_s_per_rad * self.omega_rad_s;
         let at = [self.theta_rad, self.omega_rad_s];
         let now_nm = motor_nm - back_emf_drag * self.omega_rad_s;

@@ -30,14 +30,14 @@ pub(super) struct Step<'s> {
     pub input: &'s StepInput,
     /// Time at the start of the step, s.
     pub t_s: f64,
-    /// Length of the step, s: that of the turn which the speed in its middle makes.
+    /// Length of the step, s, over which the speeds change the angles.
     pub dt_s: f64,
-    /// From the middle of the step before to the middle of this one, s, over which torques change the speed; half a step at the start.
+    /// Time over which torques change the speeds, s: from the middle of the previous step to the middle of this one; half a step at the start.
     pub kick_s: f64,
 }
 
 impl Step<'_> {
-    /// Share of the kick that lies in this step: half, unless steps differ.
+    /// Part of `kick_s` that lies in this step: half of it, without a division, unless the lengths of the steps differ.
     #[inline]
     pub fn share_of_kick(&self) -> f64 {
         if self.kick_s == self.dt_s { 0.5 } else { 0.5 * self.dt_s / self.kick_s }
