@@ -262,7 +262,7 @@ fn the_servos_study_names_the_friction_of_its_gear() {
     // With the square of the load, as the article on these recordings has it: Duclusaud et al., ICRA 2025.
     assert_eq!(effects[0]["parameters"]["exponent"]["value"], 2.0);
     assert!(diagnosis["unexplained"].is_object(), "the servo is not explained by them alone");
-    // 0.1580 and 0.0405 rad on the four recordings that took no part.
+    // 0.1580 and 0.0415 rad on the four recordings that took no part.
     let angle = &diagnosis["fit"]["channels"]["theta_out_rad"];
     let [before, after] = ["before_rmse", "after_rmse"].map(|key| angle[key].as_f64().unwrap());
     assert!((before - 0.1580).abs() < 2e-4, "{before}");

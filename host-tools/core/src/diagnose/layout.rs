@@ -234,6 +234,23 @@ mod tests {
     }
 
     #[test]
+    fn parameters_of_a_found_effect_are_found_in_their_places() {
+        let bench = bench();
+        let (layout, with) = Layout::of(&bench).with_ordinary(&bench);
+        let (layout, with) = layout.with(&with, effect("motor_stribeck_friction"));
+        let (layout, with) = layout.with(&with, effect("tendon_creep"));
+        let free = layout.free(&bench, &with);
+        for (index, id, first) in [(0, "motor_stribeck_friction", "excess_nm"), (1, "tendon_creep", "ratio")]
+        {
+            let places = layout.values_of_found(&with, index);
+            let paths: Vec<String> = free[places].iter().map(|free| free.path(&with)).collect();
+            assert_eq!(paths[0], format!("{id}.{first}"));
+            assert!(paths.iter().all(|path| path.starts_with(id)), "{paths:?}");
+        }
+        assert_eq!(layout.values_of_found(&with, 1).end, free.len());
+    }
+
+    #[test]
     fn more_than_the_ordinary_takes_its_place() {
         let bench = bench();
         let (layout, with) = Layout::of(&bench).with_ordinary(&bench);

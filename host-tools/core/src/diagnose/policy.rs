@@ -105,8 +105,8 @@ impl Policy {
         recalibrated - diagnosed > self.paying_share * recalibrated
     }
 
-    /// Whether a difference between a fitted value and a stated one, or zero, exceeds the uncertainty of the fit; without a standard
-    /// deviation it counts as doing so.
+    /// Whether the difference between a fitted value and a stated one exceeds the uncertainty of the fit; without a standard deviation it
+    /// counts as doing so.
     #[must_use]
     pub fn is_sure(&self, difference: f64, std: Option<f64>) -> bool {
         std.is_none_or(|std| difference.abs() > self.sure_stds * std)

@@ -178,7 +178,8 @@ fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
 }
 
 /// A reading at its limit in one second of ten, beside what takes 3.5 in each: of 6.65 it takes 3.65 off, of the 3.5 elsewhere 0.45. A law
-/// that did so is not found, nor is what only the one second asks for, nor an effect where twenty times as much is left.
+/// that did so is not found, nor is what only the one second asks for, nor an effect where twenty times as much is left, nor one
+/// that begins at a moment and takes less than 0.1 off elsewhere.
 #[test]
 fn what_is_idle_most_of_the_time_shows_and_a_law_as_much_elsewhere_too() {
     let bench = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
@@ -191,6 +192,7 @@ fn what_is_idle_most_of_the_time_shows_and_a_law_as_much_elsewhere_too() {
         Fitted { layout, solution, loss, stretch_losses, finished: true, unseen: false }
     };
     let name = ActiveEffect::with_defaults(find("sensor_saturation").unwrap());
+    let moment = ActiveEffect::with_defaults(find("payload_change").unwrap());
     let law = ActiveEffect::with_defaults(bowden_model::law::find("law_reading_is_curved").unwrap());
     for (effect, elsewhere, scale, shows) in [
         (name, 3.05, 1.0, true),
@@ -198,6 +200,9 @@ fn what_is_idle_most_of_the_time_shows_and_a_law_as_much_elsewhere_too() {
         (name, 3.45, 1.0, false),
         (name, 3.05, 20.0, false),
         (law, 2.0, 1.0, true),
+        // 0.08 of 0.7 elsewhere.
+        (name, 3.1, 0.2, true),
+        (moment, 3.1, 0.2, false),
     ] {
         let (before, with) = (fitted(35.0, 3.5, scale), fitted(2.5, elsewhere, scale));
         let worth = |without, with| POLICY.worth_naming(without, with);
