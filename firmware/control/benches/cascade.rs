@@ -1,4 +1,4 @@
-//! The control tick against an f32 cascade as open firmware for motors has it: prints one line of JSON for each, with its times.
+//! The control tick against an f32 cascade of position, speed and current loops: prints one line of JSON for each, with its times.
 //!
 //! The cascade is position (P), speed (PI, filtered speed) and current (PI) with limits and anti-windup, all at every tick, and nothing else: no
 //! checks of the encoders, no supervisor, compensator, reference or sample. The control tick has all of these and is fixed-point.

@@ -49,7 +49,7 @@ pub fn run() -> Result<(), String> {
     process::run(&mut script, &[0])
 }
 
-/// The part of the proof's page that has the rivals, of [`CASES`].
+/// The part of the proof's page that has the rivals, of [`CASES`], below a sentence with the numbers of cases and runs.
 fn diagnoses() -> Result<String, String> {
     let folder = target_folder()?;
     if !folder.join("rivals/installed").is_file() {
@@ -65,8 +65,16 @@ fn diagnoses() -> Result<String, String> {
     }
     let said = process::output(&mut prove)?;
     section(&said, "Rivals")
-        .map(str::to_owned)
+        .map(of_single_runs)
         .ok_or_else(|| "prove has printed no table of the rivals".to_owned())
+}
+
+/// `table` below the numbers of cases and runs, because a reader of times expects a spread.
+fn of_single_runs(table: &str) -> String {
+    let cases = CASES.len();
+    format!(
+        "{cases} cases of the proof, one of a kind, each run once: the ratio and the times of a case are single values without a spread.\n\n{table}"
+    )
 }
 
 /// What stands below a heading of the second rank, up to the next one.
@@ -85,5 +93,14 @@ mod tests {
         assert_eq!(section(page, "Rivals"), Some("four\n\n### more"));
         assert_eq!(section(page, "Numbers"), Some("five"));
         assert_eq!(section(page, "Rival"), None);
+    }
+
+    #[test]
+    fn the_diagnosis_says_first_that_its_figures_are_of_single_runs() {
+        let page = of_single_runs("| a |");
+        assert!(
+            page.starts_with("3 cases ") && page.contains("each run once") && page.ends_with("\n\n| a |"),
+            "{page}"
+        );
     }
 }
