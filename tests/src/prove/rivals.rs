@@ -329,9 +329,10 @@ fn write(page: &mut String, outcomes: &[&Outcome], results: &[RivalOutcome]) -> 
          Other tools on the same files; cases: {}. They see the training recording, the rig file, the held-out inputs and the\n\
          first 0.1 s of the held-out outputs, choose their settings on a third of the training recording, and run freely; their\n\
          predictions are judged like a replay. Ratio: held-out error of the prediction over that of the true physics with the\n\
-         true parameters (root mean square over the channels); median by group, and median and 90 % of all. Diverged: cases in which the best settings of a channel left the training data by three of its ranges;\n\
-         the next best took their place, and where all diverged the channel stayed at its last good value. The rivals' times are those of\n\
-         one thread, without the recalibration that some stand on. Settings and their sources: tests/rivals/README.md.\n",
+         true parameters (root mean square over the channels); median by group, and median and 90 % of all. Diverged: cases in\n\
+         which the best settings of a channel left the training data by three of its ranges; the next best took their place, and\n\
+         where all diverged the channel stayed at its last good value. The rivals' times are those of one thread, without the\n\
+         recalibration that some stand on. Settings and their sources: tests/rivals/README.md.\n",
         cases.len()
     )?;
     write!(page, "| tool | names physics | abstains |")?;
