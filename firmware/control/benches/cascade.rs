@@ -110,7 +110,8 @@ impl Bench {
     }
 
     fn assert_runs(&self) {
-        assert!(self.controller.state() == State::Run, "the controller is in {:?}", self.controller.state());
+        let state = self.controller.state();
+        assert!(state == State::Run, "the controller is in {state:?}: {:?}", self.controller.fault());
     }
 
     fn tick(&mut self) -> TickOutput {

@@ -1,4 +1,4 @@
-//! A joint in motion for those who count or time ticks: its encoders follow the reference, tensions and current are at rest.
+//! A joint in motion for those who count or time ticks: its encoders follow the reference, the current follows the duty, tensions are at rest.
 
 use super::amt22_frame;
 use crate::tick::{EncoderWord, TickInput, TickOutput};
@@ -14,13 +14,16 @@ pub struct SteadyJoint {
     random: u32,
     sequence: u8,
     reference_raw: i32,
+    /// Last change of the reference, 2⁻²⁰ rad a tick.
+    turned_raw: i32,
+    duty_raw: i16,
 }
 
 impl SteadyJoint {
     /// At angle zero.
     #[must_use]
     pub const fn new() -> Self {
-        Self { random: 1, sequence: 0, reference_raw: 0 }
+        Self { random: 1, sequence: 0, reference_raw: 0, turned_raw: 0, duty_raw: 0 }
     }
 
     /// 0 to below `range`, at most 2¹⁶.
@@ -39,24 +42,63 @@ impl SteadyJoint {
             sequence: self.sequence,
             bus_error: false,
         });
+        // With the default parameters, A/code and all: 24 V at 2 Ω are 1787 codes, and 0.9 V·s/rad at 10⁴ ticks/s 0.64 code for 2⁻²⁰ rad a tick.
+        let driven = (i32::from(self.duty_raw) * 1787) >> 15;
+        let back_emf = (self.turned_raw * 654) >> 10;
+        let zero = 2043 + self.below(10) as i32;
         TickInput {
             encoder,
             // 30 N ± 0.5 N; a code that stays the same is a fault.
             tension_raw: [0; 4].map(|_| (1463 + self.below(28)) as u16),
-            current_raw: (2043 + self.below(10)) as u16,
+            current_raw: (zero + driven - back_emf).clamp(0, 4095) as u16,
             bus_raw: (2700 + self.below(16)) as u16,
             bridge_fault: false,
         }
     }
 
-    /// Follows the reference of a tick.
+    /// Follows the reference and the duty of a tick.
     pub const fn follow(&mut self, output: &TickOutput) {
+        self.turned_raw = output.sample.reference_raw - self.reference_raw;
         self.reference_raw = output.sample.reference_raw;
+        self.duty_raw = output.duty_raw;
     }
 }
 
 impl Default for SteadyJoint {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance::Orders;
+    use crate::controller::Controller;
+    use crate::parameters::Parameters;
+    use crate::tick::Command;
+    use crate::{reference_config, tick_config};
+    use bowden_link::State;
+    use bowden_link::message::{Goal, Mode};
+
+    /// A minute: a motor without current is a fault after 44 s.
+    #[test]
+    fn a_controller_runs_on_it() {
+        let parameters = Parameters::default();
+        let mut controller = Controller::new(tick_config(&parameters).unwrap());
+        let (mut joint, mut orders) = (SteadyJoint::new(), Orders::default());
+        let sine = reference_config(&parameters, SINE).unwrap();
+        let commands = [
+            (1, Command::Enter(Goal::Ready)),
+            (100_000, Command::SetReference(sine)),
+            (100_001, Command::Enter(Goal::Run(Mode::Position))),
+        ];
+        for tick in 0..700_000 {
+            orders.command = commands.iter().find(|(at, _)| *at == tick).map(|(_, command)| *command);
+            let output = controller.tick(&joint.input(), &mut orders);
+            joint.follow(&output);
+            assert_eq!(output.tripped, None, "in tick {tick}");
+        }
+        assert_eq!(controller.state(), State::Run);
     }
 }
