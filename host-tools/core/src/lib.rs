@@ -8,6 +8,7 @@ pub mod diagnose;
 pub mod effect_source;
 pub mod fit;
 pub mod formula;
+mod guarded;
 pub mod hypothesis;
 pub mod joint_model;
 pub mod neighbours;

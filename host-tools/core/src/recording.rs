@@ -14,7 +14,6 @@ mod durable;
 mod file;
 mod format;
 mod frozen;
-mod guarded;
 mod gzip_members;
 mod mcap_file;
 mod metadata;

@@ -55,7 +55,8 @@ pub struct Summary {
     pub left: usize,
 }
 
-/// Diagnoses what is not done yet, and writes tables and page. A recording that cannot be diagnosed stops no other one.
+/// Diagnoses what is not done yet, and writes tables and page. A recording that cannot be diagnosed, or whose diagnosis panics, stops no
+/// other one.
 ///
 /// # Errors
 /// When no recording could be diagnosed, with the reason of the first; when the medium refuses.
@@ -68,12 +69,10 @@ pub fn survey(plan: &Plan, out: &Path, workers: usize, progress: &dyn Progress) 
     let failed = Mutex::new(Vec::new());
     let diagnosed = Mutex::new(BTreeSet::new());
     let work = || -> Result<(), Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        let pool = pool.map_err(|error| Failure::failed(format!("a thread cannot be started: {error}")))?;
         while let Some(task) = pending.get(next.fetch_add(1, Ordering::Relaxed))
             && !progress.interrupted()
         {
-            match pool.install(|| task.diagnose(&Silent(progress))) {
+            match task.diagnose(&Silent(progress)) {
                 Ok(surveyed) if surveyed.diagnosis.complete => {
                     store.save(&surveyed)?;
                     diagnosed.lock().unwrap_or_else(PoisonError::into_inner).insert(surveyed.recording);

@@ -99,9 +99,7 @@ pub fn survey_one(
 }
 
 fn diagnosed(task: &Task) -> Result<String, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = pool.map_err(|error| Failure::failed(format!("a thread cannot be started: {error}")))?;
-    pool.install(|| task.diagnose(&Quiet))?.to_json()
+    task.diagnose(&Quiet)?.to_json()
 }
 
 /// The page of a survey in its folder.

@@ -20,10 +20,10 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
 use super::build::Table;
-use super::guarded::guarded;
 use super::origin::Origin;
 use super::place::Places;
 use super::{Column, ReadOptions, Recording, TIME_ROLE, TextColumn};
+use crate::guarded::guarded;
 use crate::outcome::Failure;
 
 /// First and last bytes of a file.
@@ -158,7 +158,7 @@ pub(super) fn read(path: &Path, source: String, options: &ReadOptions) -> Result
     let mut origin = Origin::new(source, Places::samples());
     // The library panics where parts of a damaged file contradict each other.
     let table = guarded(|| try_read(path, &mut origin, options))
-        .unwrap_or_else(|panic| Err(Unreadable::Damaged(panic)));
+        .unwrap_or_else(|panic| Err(Unreadable::Damaged(panic.text)));
     let table = table.map_err(|error| {
         let (source, reason) = (&origin.source, error.reason());
         Failure::bad_input(format!("{source}: {reason}; copy or convert the file again"))

@@ -8,7 +8,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::RECORD_LIMIT;
 use super::lengths::parse_record;
-use crate::recording::guarded::guarded;
+use crate::guarded::guarded;
 
 /// Records of a file, those within chunks among them; a chunk is checked before its first record is given.
 pub(in crate::recording) struct Records<R> {
