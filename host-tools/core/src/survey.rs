@@ -36,7 +36,7 @@ use crate::progress::Progress;
 pub use drift::{Drift, drifts};
 pub use plan::{Plan, RigRule};
 pub use rows::{Status, SurveyRow};
-pub use store::{Store, Surveyed};
+pub use store::{PROGRAM, Store, Surveyed};
 pub use task::Task;
 
 /// The page of a survey, in its folder.

@@ -1,5 +1,8 @@
 //! Surveys: many recordings of several benches, ended and taken up again, with one that is no recording among them.
 
+#[path = "../build/sources.rs"]
+mod sources;
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -15,9 +18,22 @@ use parquet::record::{Field, Row};
 
 const RIG: &str = include_str!("rigs/bench.toml");
 
+/// Dry friction of the joint, which the rig file does not state.
+const STICKING: &str = "
+[simulation]
+effects = [\"joint_coulomb_friction\"]
+[effects.joint_coulomb_friction]
+torque_nm = 0.15
+";
+
 /// Records the bench with other parameters than its rig file states.
 fn record(path: &Path, changed: &[&str], seed: u64) {
-    let mut rig = Rig::parse(RIG, "bench.toml").unwrap();
+    record_with(path, "", changed, seed);
+}
+
+/// The same, with more in the rig than its file has.
+fn record_with(path: &Path, more: &str, changed: &[&str], seed: u64) {
+    let mut rig = Rig::parse(&[RIG, more].concat(), "bench.toml").unwrap();
     for parameter in changed {
         parameter.parse::<Assignment>().unwrap().apply(&mut rig).unwrap();
     }
@@ -161,4 +177,33 @@ fn a_folder_of_which_nothing_can_be_diagnosed_says_the_first_reason() {
     fs::remove_file(place.path().join("a.csv")).unwrap();
     let failure = Plan::new(place.path(), &[], &out).unwrap_err();
     assert!(failure.message().contains("no recording"), "{failure}");
+}
+
+#[test]
+fn the_digest_of_sources_is_of_names_and_contents_and_not_of_the_place() {
+    let place = tempfile::tempdir().unwrap();
+    let lay = |name: &str, files: &[(&str, &str)]| {
+        let root = place.path().join(name);
+        for (file, text) in files {
+            let path = root.join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        sources::digest(&root, &["Cargo.lock", "src"]).unwrap()
+    };
+    let of = [("Cargo.lock", "1"), ("src/a.rs", "one"), ("src/b/c.rs", "two")];
+    let first = lay("first", &of);
+    assert_eq!(first.len(), 64);
+    assert_eq!(lay("elsewhere", &[of[2], of[1], of[0], ("README.md", "not a source")]), first);
+    let changed = [
+        lay("contents", &[of[0], of[1], ("src/b/c.rs", "twO")]),
+        lay("name", &[of[0], of[1], ("src/b/d.rs", "two")]),
+        lay("moved", &[of[0], ("src/a.rs", "onetwo"), ("src/b/c.rs", "")]),
+        lay("more", &[of[0], of[1], of[2], ("src/d.rs", "")]),
+        lay("dependencies", &[("Cargo.lock", "2"), of[1], of[2]]),
+        lay("without", &of[1..]),
+    ];
+    for (number, digest) in changed.iter().enumerate() {
+        assert!(*digest != first && !changed[..number].contains(digest), "{number}");
+    }
 }

@@ -1,6 +1,6 @@
 //! The diagnosis of one recording of a survey.
 
-use super::store::{Surveyed, key_of};
+use super::store::{PROGRAM, Surveyed, key_of};
 use super::task::{RIG_BESIDE, Task};
 use crate::diagnose::diagnose;
 use crate::guarded::{Panicked, guarded};
@@ -39,7 +39,7 @@ impl Task {
                 "{shown}: no rig: name one with --rig, or put a {RIG_BESIDE} beside the recording or above"
             ))
         })?;
-        let key = key_of(&self.path, rig)?;
+        let key = key_of(&self.path, rig, PROGRAM)?;
         let loaded = LoadedStudy::of_one_bench(rig, std::slice::from_ref(&self.path), &[])?;
         let recording = &loaded.study.recordings[0].recording;
         let (samples, duration_s, notes) =

@@ -16,6 +16,10 @@ use crate::output;
 /// Value of `schema`.
 const SCHEMA: &str = "bowden-surveyed/1";
 
+/// The program, for a digest: its version, and a digest of the sources that a diagnosis depends on and of the versions of their dependencies.
+/// Command and Python package of the same sources have the same.
+pub const PROGRAM: &str = concat!("bowden ", env!("CARGO_PKG_VERSION"), " ", env!("BOWDEN_SOURCES"));
+
 /// Folder of the results, in that of the survey.
 const RESULTS: &str = "diagnoses";
 
@@ -79,10 +83,10 @@ impl Surveyed {
     }
 }
 
-/// Digest of what a result is made of: the bytes of recording and rig, and the version of the program.
-pub(super) fn key_of(recording: &Path, rig: &Path) -> Result<String, Failure> {
+/// Digest of what a result is made of: the bytes of recording and rig, and the program, usually [`PROGRAM`].
+pub(super) fn key_of(recording: &Path, rig: &Path, program: &str) -> Result<String, Failure> {
     let mut digest = Sha256::new();
-    digest.update(concat!("bowden ", env!("CARGO_PKG_VERSION"), "\0"));
+    digest.update(format!("{program}\0"));
     for path in [rig, recording] {
         let unreadable = |error: std::io::Error| {
             let reason = output::describe(&error);
@@ -122,10 +126,14 @@ impl Store {
         &self.folder
     }
 
-    /// Whether there is a result for the recording and the rig as they are now.
+    /// Whether there is a result of this program for the recording and the rig as they are now.
     #[must_use]
     pub fn has(&self, task: &Task) -> bool {
-        let key = task.rig.as_ref().and_then(|rig| key_of(&task.path, rig).ok());
+        self.has_of(task, PROGRAM)
+    }
+
+    fn has_of(&self, task: &Task, program: &str) -> bool {
+        let key = task.rig.as_ref().and_then(|rig| key_of(&task.path, rig, program).ok());
         let surveyed = self.load(task);
         surveyed.is_some_and(|surveyed| Some(surveyed.key) == key && surveyed.bench == task.bench)
     }
@@ -159,4 +167,42 @@ fn make_folder_of(path: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| {
         Failure::failed(format!("{}: cannot be made: {}", folder.display(), output::describe(&error)))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example::findings;
+
+    #[test]
+    fn a_result_is_of_recording_rig_bench_and_program() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, rig] = ["a.csv", "rig.toml"].map(|name| folder.path().join(name));
+        fs::write(&path, "recording").unwrap();
+        fs::write(&rig, "rig").unwrap();
+        let task = Task {
+            recording: "a.csv".to_owned(),
+            path: path.clone(),
+            bench: "a".to_owned(),
+            rig: Some(rig.clone()),
+        };
+        let store = Store::open(&folder.path().join("out")).unwrap();
+        assert!(!store.has(&task));
+        let key = key_of(&path, &rig, PROGRAM).unwrap();
+        store.save(&Surveyed::new(&task, key, (3, 1.0), Vec::new(), findings(2).diagnosis)).unwrap();
+        assert!(store.has(&task));
+
+        // Version 0.1.0 stays for many changes of the sources, each of which may change a diagnosis.
+        let older = PROGRAM.replace(env!("BOWDEN_SOURCES"), &"0".repeat(64));
+        assert!(older.starts_with(concat!("bowden ", env!("CARGO_PKG_VERSION"))) && older != PROGRAM);
+        assert!(!store.has_of(&task, &older));
+        assert!(!store.has(&Task { bench: "b".to_owned(), ..task.clone() }));
+        for changed in [&path, &rig] {
+            let before = fs::read(changed).unwrap();
+            fs::write(changed, "changed").unwrap();
+            assert!(!store.has(&task), "{}", changed.display());
+            fs::write(changed, before).unwrap();
+            assert!(store.has(&task));
+        }
+    }
 }
