@@ -6,7 +6,7 @@
 //! | file | one row |
 //! |---|---|
 //! | `recordings.parquet` | a recording: bench, status, verdict, held-out loss |
-//! | `effects.parquet` | an effect or law that was named in a recording |
+//! | `effects.parquet` | an effect or law that was named in a recording, and since which one the bench has it |
 //! | `parameters.parquet` | a parameter of a recording: recalibrated, or of a named effect |
 //! | `drifts.parquet` | a recalibrated parameter of a bench over its recordings |
 //! | `survey.html` | the benches side by side |
@@ -15,6 +15,7 @@
 //! many run at once as there are workers: several threads would wait for each other within a diagnosis.
 
 mod drift;
+mod occurrences;
 mod page;
 mod parquet_file;
 mod plan;

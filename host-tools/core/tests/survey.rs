@@ -162,6 +162,32 @@ fn a_survey_says_which_bench_drifts_goes_on_where_it_stopped_and_gives_the_same_
 }
 
 #[test]
+fn a_survey_says_since_which_recording_a_bench_has_an_effect() {
+    let place = tempfile::tempdir().unwrap();
+    let [folder, out] = ["recordings", "out"].map(|name| place.path().join(name));
+    fs::create_dir_all(folder.join("a")).unwrap();
+    fs::write(folder.join("rig.toml"), RIG).unwrap();
+    for (seed, more) in [(1, ""), (2, STICKING), (3, STICKING)] {
+        record_with(&folder.join(format!("a/run-{seed}.csv")), more, &[], seed);
+    }
+    let plan = Plan::new(&folder, &[], &out).unwrap();
+    assert_eq!(survey(&plan, &out, 2, &Quiet).unwrap().diagnosed, 3);
+
+    let found = rows(&out.join("effects.parquet"));
+    let cells: Vec<[String; 3]> =
+        found.iter().map(|row| ["recording", "id", "since"].map(|name| text(row, name))).collect();
+    let friction = |recording: &str| [recording, "joint_coulomb_friction", "a/run-2.csv"].map(str::to_owned);
+    assert_eq!(cells, [friction("a/run-2.csv"), friction("a/run-3.csv")]);
+    let page = fs::read_to_string(out.join("survey.html")).unwrap();
+    assert_eq!(
+        page.matches("<code>joint_coulomb_friction</code> since run-2.csv").count(),
+        2,
+        "card and overview"
+    );
+    assert!(!page.contains("in every recording"));
+}
+
+#[test]
 fn a_folder_of_which_nothing_can_be_diagnosed_says_the_first_reason() {
     let place = tempfile::tempdir().unwrap();
     fs::write(place.path().join("a.csv"), "").unwrap();

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 
 use super::drift::{Drift, drifts};
+use super::occurrences::{Since, occurrences};
 use super::rows::{Status, SurveyRow};
 use super::tables;
 use crate::report::{figures, page};
@@ -75,24 +76,7 @@ struct BenchCard<'p, 'r> {
 impl<'p, 'r> BenchCard<'p, 'r> {
     fn new(name: &'p str, rows: &'r [SurveyRow<'p>], found: &'r [Drift]) -> Self {
         let drifting = found.iter().filter(|drift| drift.bench == name && drift.drifts()).collect();
-        let mut effects: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (place, surveyed) in
-            rows.iter().enumerate().filter_map(|(k, row)| Some((k, row.surveyed.as_ref()?)))
-        {
-            for effect in &surveyed.diagnosis.effects {
-                let id = match &effect.channel {
-                    Some(channel) => format!("{} ({channel})", effect.id),
-                    None => effect.id.clone(),
-                };
-                effects.entry(id).or_default().push(place);
-            }
-            for law in &surveyed.diagnosis.laws {
-                effects.entry(format!("law at {}", law.port)).or_default().push(place);
-            }
-        }
-        // An effect may be named twice in a recording, with other parameters.
-        effects.values_mut().for_each(Vec::dedup);
-        Self { name, rows, drifting, effects }
+        Self { name, rows, drifting, effects: occurrences(rows) }
     }
 
     /// How much there is to look at: drifts, then recordings with named effects.
@@ -107,16 +91,13 @@ impl<'p, 'r> BenchCard<'p, 'r> {
 
     /// Since when, in words.
     fn since(&self, places: &[usize]) -> String {
-        let (Some(first), Some(last)) = (places.first(), places.last()) else { return String::new() };
-        let done = |place: &usize| self.rows[*place].surveyed.is_some();
-        let between = (*first..self.rows.len()).filter(done).count();
-        let diagnosed = (0..self.rows.len()).filter(done).count();
-        match (places.len(), between) {
-            (count, _) if count == diagnosed => "in every recording".to_owned(),
-            (count, all) if count == all && count > 1 => format!("since {}", self.file(*first)),
-            (1, _) => format!("in {} alone", self.file(*first)),
-            (count, _) => {
-                format!("in {count} of {diagnosed}, from {} to {}", self.file(*first), self.file(*last))
+        match Since::of(places, self.rows) {
+            None => String::new(),
+            Some(Since::Always(_)) => "in every recording".to_owned(),
+            Some(Since::From(first)) => format!("since {}", self.file(first)),
+            Some(Since::Once(only)) => format!("in {} alone", self.file(only)),
+            Some(Since::Sometimes { count, diagnosed, first, last }) => {
+                format!("in {count} of {diagnosed}, from {} to {}", self.file(first), self.file(last))
             }
         }
     }

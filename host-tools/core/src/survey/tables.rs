@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::drift::drifts;
+use super::occurrences::{Since, effect_name, law_name, occurrences};
 use super::parquet_file::{NamedColumn, Values, write as write_table};
 use super::rows::{Status, SurveyRow};
 use super::store::Surveyed;
@@ -69,6 +70,8 @@ fn recordings(rows: &[SurveyRow<'_>]) -> Vec<NamedColumn> {
 /// An effect or law of a recording.
 struct Found<'r> {
     surveyed: &'r Surveyed,
+    /// Recording from which on all of the bench name it.
+    since: Option<&'r str>,
     id: &'r str,
     component: &'r str,
     channel: Option<&'r String>,
@@ -80,31 +83,7 @@ struct Found<'r> {
 }
 
 fn effects(rows: &[SurveyRow<'_>]) -> Vec<NamedColumn> {
-    let mut all = Vec::new();
-    for surveyed in rows.iter().filter_map(|row| row.surveyed.as_ref()) {
-        all.extend(surveyed.diagnosis.effects.iter().map(|effect| Found {
-            surveyed,
-            id: &effect.id,
-            component: &effect.component,
-            channel: effect.channel.as_ref(),
-            probability: Some(effect.probability),
-            onset_s: effect.onset_s,
-            formula: None,
-            heldout_improvement: effect.heldout_improvement,
-            sentence: &effect.sentence,
-        }));
-        all.extend(surveyed.diagnosis.laws.iter().map(|law| Found {
-            surveyed,
-            id: "law",
-            component: &law.component,
-            channel: law.channel.as_ref(),
-            probability: None,
-            onset_s: None,
-            formula: Some(&law.formula),
-            heldout_improvement: law.heldout_improvement,
-            sentence: &law.sentence,
-        }));
-    }
+    let all: Vec<Found<'_>> = SurveyRow::benches(rows).flat_map(|(_, rows)| found(rows)).collect();
     vec![
         ("recording", text(&all, |found| Some(found.surveyed.recording.clone()))),
         ("bench", text(&all, |found| Some(found.surveyed.bench.clone()))),
@@ -116,7 +95,45 @@ fn effects(rows: &[SurveyRow<'_>]) -> Vec<NamedColumn> {
         ("formula", text(&all, |found| found.formula.cloned())),
         ("heldout_improvement", number(&all, |found| Some(found.heldout_improvement))),
         ("sentence", text(&all, |found| Some(found.sentence.to_owned()))),
+        ("since", text(&all, |found| found.since.map(str::to_owned))),
     ]
+}
+
+/// All effects and laws of a bench.
+fn found<'r>(rows: &'r [SurveyRow<'_>]) -> Vec<Found<'r>> {
+    let occurrences = occurrences(rows);
+    let since = |name: &str| {
+        let place = Since::of(occurrences.get(name)?, rows)?.place()?;
+        Some(rows[place].task.recording.as_str())
+    };
+    let mut all = Vec::new();
+    for surveyed in rows.iter().filter_map(|row| row.surveyed.as_ref()) {
+        all.extend(surveyed.diagnosis.effects.iter().map(|effect| Found {
+            surveyed,
+            since: since(&effect_name(effect)),
+            id: &effect.id,
+            component: &effect.component,
+            channel: effect.channel.as_ref(),
+            probability: Some(effect.probability),
+            onset_s: effect.onset_s,
+            formula: None,
+            heldout_improvement: effect.heldout_improvement,
+            sentence: &effect.sentence,
+        }));
+        all.extend(surveyed.diagnosis.laws.iter().map(|law| Found {
+            surveyed,
+            since: since(&law_name(law)),
+            id: "law",
+            component: &law.component,
+            channel: law.channel.as_ref(),
+            probability: None,
+            onset_s: None,
+            formula: Some(&law.formula),
+            heldout_improvement: law.heldout_improvement,
+            sentence: &law.sentence,
+        }));
+    }
+    all
 }
 
 /// A parameter of a recording: name, where from, value in the rig file, and the estimate.
