@@ -144,6 +144,43 @@ fn a_joint_of_a_model_takes_the_rigs_values_and_nothing_else_changes() {
     assert!(says("it does not harden"), "{mapped:#?}");
 }
 
+/// A motor that turns the arm without tendons: all of it goes into the one joint.
+#[test]
+fn a_joint_of_a_model_takes_the_rotor_of_a_motor_without_tendons_as_armature() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("driven.xml");
+    std::fs::write(&path, DRIVEN).unwrap();
+    let (start, end) = (BENCH.find("[pulleys]").unwrap(), BENCH.find("[load]").unwrap());
+    let effects = "\n[simulation]\neffects = [\"motor_coulomb_friction\", \"motor_viscous_friction\", \
+                   \"joint_coulomb_friction\", \"joint_viscous_friction\"]\n\
+                   [effects.motor_coulomb_friction]\ntorque_nm = 0.05\n\
+                   [effects.motor_viscous_friction]\nviscous_nm_s_per_rad = 0.01\n\
+                   [effects.joint_coulomb_friction]\ntorque_nm = 0.07\n\
+                   [effects.joint_viscous_friction]\nviscous_nm_s_per_rad = 0.002\n";
+    let text = BENCH.replace(&BENCH[start..end], "") + effects;
+    let (written, mapped) = into_mjcf(&Rig::parse(&text, "rig.toml").unwrap(), &path, "knee").unwrap();
+    let knee = written.lines().find(|line| line.contains("\"knee\"")).unwrap();
+    let value = |name: &str| -> f64 {
+        let (_, after) = knee.split_once(&format!(" {name}=\"")).unwrap();
+        after.split('"').next().unwrap().parse().unwrap()
+    };
+    // Gear ratio 30, rotor 5e-6 kg m2; viscous: load, motor, and what the effects add.
+    near(value("armature"), 30.0 * 30.0 * 5e-6);
+    near(value("damping"), 0.004 + 0.02 + 0.01 + 0.002);
+    near(value("frictionloss"), 0.05 + 0.07);
+    // The model's own spring stays.
+    assert_eq!((value("stiffness"), value("springref")), (2.0, 10.0));
+    let expected: Vec<&str> = DRIVEN.lines().filter(|line| !line.contains("name=\"knee\"")).collect();
+    let others: Vec<&str> = written.lines().filter(|line| !line.contains("name=\"knee\"")).collect();
+    assert_eq!(others, expected);
+    let said: Vec<String> = mapped.iter().map(ToString::to_string).collect();
+    assert!(
+        said.iter()
+            .any(|line| line.starts_with("motor.rotor_inertia_kg_m2, gear_ratio -> armature = 0.0045"))
+    );
+    assert!(!said.iter().any(|line| line.contains("one joint has no transmission")), "{said:#?}");
+}
+
 #[test]
 fn a_rig_out_to_mujoco_comes_back_as_it_was() {
     let text = BENCH.to_owned()
