@@ -199,7 +199,7 @@ fn sentence(tried: &TriedHypothesis) -> String {
             Some(RivalLoss { id, heldout_loss }) => {
                 write!(text, "; {what}{over} {id} to {}", short(*heldout_loss))
             }
-            None => write!(text, "; {what} promises too little for a fit"),
+            None => write!(text, "; {what} reduces the loss too little to be fitted"),
         };
     }
     let end = if tried.found { "The diagnosed rig simulates it." } else { "It is not in the diagnosed rig." };
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rival_that_promises_nothing_is_said_to() {
+    fn a_rival_that_is_not_fitted_is_named_with_the_reason() {
         let mut tried = TriedHypothesis {
             name: "drag".to_owned(),
             component: "load".to_owned(),
@@ -235,8 +235,8 @@ mod tests {
         assert_eq!(
             sentence(&tried),
             "Beside the recalibrated rig, drag brings the held-out loss from 5.00 to 1.50; the best effect of the catalogue joint_spring to \
-             4.00; the best closed form promises too little for a fit; the best free curve promises too little for a fit. It is not in the \
-             diagnosed rig."
+             4.00; the best closed form reduces the loss too little to be fitted; the best free curve reduces the loss too little to be fitted. \
+             It is not in the diagnosed rig."
         );
         tried.free_curve = Some(RivalLoss { id: "theta_rad".to_owned(), heldout_loss: 2.0 });
         assert!(

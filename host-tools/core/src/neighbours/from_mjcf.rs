@@ -23,7 +23,7 @@ const GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];
 /// Reads what a MuJoCo model says of a hinge joint: everything that hangs on it, with all joints beyond at zero, as one weight.
 ///
 /// # Errors
-/// With file and line: no such joint, one that is no hinge, a body whose mass the file does not tell, and what is no MJCF.
+/// With file and line: no such joint, one that is no hinge, a body without a mass in the file, and what is no MJCF.
 pub fn from_mjcf(path: &Path, joint: &str) -> Result<Imported, Failure> {
     let text = read(path)?;
     let source = path.display().to_string();
