@@ -19,6 +19,7 @@ use crate::capture::{Capture, PROGRESS_STEPS};
 use crate::course::Course;
 use crate::error::LinkError;
 use crate::evidence::Origin;
+use crate::rig_file::Weight;
 use crate::session::{RunEnd, Session, Stop};
 use ledger::{Done, Ledger};
 use plan_file::{Motion, Plan, Step};
@@ -56,6 +57,8 @@ pub struct Setting<'s> {
     pub ending: &'s str,
     /// What recordings say of themselves; plan and step are added.
     pub origin: &'s Origin,
+    /// Weight on the arm, for the rig in the recordings.
+    pub load: Option<Weight>,
     /// Text of the plan.
     pub text: &'s str,
     /// Whether the user wants to stop.
@@ -169,7 +172,7 @@ fn do_item(session: &mut Session, item: &Item, setting: &Setting) -> Result<Done
 }
 
 fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting) -> Result<Done, Failure> {
-    let Setting { folder, ending, origin, text, stop, progress } = *setting;
+    let Setting { folder, ending, origin, load, text, stop, progress } = *setting;
     let name = format!("{}.{ending}", item.name);
     let out = folder.join(&name);
     // `kill -9` and a power cut leave rows that no entry of the ledger tells of, perhaps in another format. Before anything moves.
@@ -190,7 +193,7 @@ fn follow(session: &mut Session, item: &Item, motion: &Motion, setting: &Setting
         every: motion.every,
         seconds: Some(motion.seconds),
         origin: &origin,
-        rig: None,
+        rig: Some((&item.name, load)),
         replug: None,
     };
     let (tally, end) = capture.run(session, &Course::OnBoard(motion.reference()), stop, progress)?;

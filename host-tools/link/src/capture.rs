@@ -43,7 +43,7 @@ pub struct Capture<'c> {
     pub seconds: Option<f64>,
     /// What the recording says of itself, beside what the board says.
     pub origin: &'c Origin,
-    /// Name and load of the joint, where a rig file is made from the board's parameters.
+    /// Name and load of the joint, for the rig that the recording has of the board's parameters; none where its origin has one.
     pub rig: Option<(&'c str, Option<Weight>)>,
     /// How a board that was unplugged is found again; otherwise a broken link is the end.
     pub replug: Option<&'c Replug>,
@@ -91,6 +91,7 @@ impl Capture<'_> {
             Format::Csv | Format::GzippedCsv => vec![(sidecar(self.out), parameters.to_toml())],
         };
         let conversion = Conversion::new(parameters)?;
+        let rig = self.rig.map(|(name, load)| rig_file::Draft::new(name, parameters, load)).transpose()?;
         let form = Form {
             format: self.format,
             conversion,
@@ -98,6 +99,7 @@ impl Capture<'_> {
             every: self.every,
             orders,
             metadata,
+            rig,
             beside,
             metadata_file: Metadata::file_beside(self.out),
         };
@@ -173,8 +175,8 @@ impl Capture<'_> {
         let mut known = evidence::end(recorder.tally(), &words(&end));
         if let Some((name, load)) = self.rig {
             let bus_v = recorder.tally().bus_v.unwrap_or_default();
-            let text = rig_file::text(name, session.parameters(), bus_v, load)?;
-            known.extend(END_GROUP, [("rig".to_owned(), text)]);
+            let rig = rig_file::Draft::new(name, session.parameters(), load)?;
+            known.extend(END_GROUP, [("rig".to_owned(), rig.text(bus_v))]);
         }
         if !gaps.is_empty() {
             let period_ns = recorder.tally().period_ns;

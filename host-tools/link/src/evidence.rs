@@ -104,6 +104,11 @@ pub fn begin(metadata: &mut Metadata, started: Vec<(String, String)>, tick: u64,
     );
 }
 
+/// Adds the text of a rig file. A recording that is cut loses its end, and keeps this.
+pub fn add_rig(metadata: &mut Metadata, rig: String) {
+    metadata.extend(RECORDING_GROUP, [("rig".to_owned(), rig)]);
+}
+
 /// What is known at the end: how it came, and what is missing.
 #[must_use]
 pub fn end(tally: &Tally, how: &str) -> Metadata {

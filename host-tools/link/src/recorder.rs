@@ -17,6 +17,7 @@ use super::conversion::{Conversion, columns};
 use super::evidence;
 use super::losses::Losses;
 use super::raw::{self, OrderBook};
+use super::rig_file;
 use super::session::RunTick;
 
 /// Rows that may wait for the medium: 6.5 s at 10 kHz, 5 MB.
@@ -50,6 +51,8 @@ pub struct Form {
     pub orders: Option<OrderBook>,
     /// What stands before the rows; the time of the first one is added.
     pub metadata: Metadata,
+    /// Rig file that stands before the rows too, with the supply of the first one.
+    pub rig: Option<rig_file::Draft>,
     /// Files that stand beside the recording, with their text.
     pub beside: Vec<(PathBuf, String)>,
     /// File that the metadata go to where the format has no place for them.
@@ -191,6 +194,9 @@ fn write(
     let mut metadata = form.metadata.clone();
     let started = started.get_or_init(evidence::started).clone();
     evidence::begin(&mut metadata, started, first.tick, first.period_ns);
+    if let Some(rig) = &form.rig {
+        evidence::add_rig(&mut metadata, rig.text(form.conversion.bus_v(&first.sample)));
+    }
     if let Some(path) = &form.metadata_file {
         output::write_text(path, &metadata.to_toml()).map_err(nothing)?;
     }

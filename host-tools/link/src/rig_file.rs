@@ -41,32 +41,45 @@ impl std::str::FromStr for Weight {
     }
 }
 
-/// The text of a rig file. `bus_v` is the supply as it was measured.
-///
-/// # Errors
-/// [`LinkError::NoParameter`]
-pub fn text(
-    name: &str,
-    parameters: &ParameterSet,
-    bus_v: f64,
-    weight: Option<Weight>,
-) -> Result<String, LinkError> {
+/// A rig file but for the voltage of the supply, which is measured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Draft {
+    before: String,
+    behind: String,
+}
+
+impl Draft {
+    /// What the board's parameters and the weight say.
+    ///
+    /// # Errors
+    /// [`LinkError::NoParameter`]
+    pub fn new(name: &str, parameters: &ParameterSet, weight: Option<Weight>) -> Result<Self, LinkError> {
+        let before = format!(
+            "# Written by bowden from the parameters of the board and the measured supply.\n\
+             schema = \"{SCHEMA}\"\nname = {}\n\n[motor]\nsupply_v = ",
+            toml::Value::from(name)
+        );
+        Ok(Self { before, behind: behind_the_supply(parameters, weight)? })
+    }
+
+    /// The text of the file, with the supply as it was measured, V.
+    #[must_use]
+    pub fn text(&self, bus_v: f64) -> String {
+        format!("{}{:?}\n{}", self.before, (bus_v * 100.0).round() / 100.0, self.behind)
+    }
+}
+
+fn behind_the_supply(parameters: &ParameterSet, weight: Option<Weight>) -> Result<String, LinkError> {
     let value = |name: &str| parameters.value(name);
     let full_scale_n = {
         let gains = ["f1", "f2", "f3", "f4"].map(|channel| value(&format!("tension.{channel}.gain")));
         let gains = gains.into_iter().collect::<Result<Vec<f64>, _>>()?;
         gains.iter().sum::<f64>() / gains.len() as f64 * f64::from(ADC_BITS).exp2()
     };
-    let mut text = format!(
-        "# Written by `bowden record` from the parameters of the board and the measured supply.\n\
-         schema = \"{SCHEMA}\"\nname = {}\n",
-        toml::Value::from(name)
-    );
     let sections = [
         (
-            "motor",
+            None,
             vec![
-                ("supply_v", (bus_v * 100.0).round() / 100.0),
                 ("resistance_ohm", value("motor.resistance")?),
                 ("inductance_h", 0.0),
                 ("torque_constant_nm_per_a", value("motor.torque_constant")?),
@@ -76,14 +89,14 @@ pub fn text(
             ],
         ),
         (
-            "pulleys",
+            Some("pulleys"),
             vec![
                 ("input_radius_m", value("pulley.input_radius")?),
                 ("output_radius_m", value("pulley.output_radius")?),
             ],
         ),
         (
-            "tendon",
+            Some("tendon"),
             vec![
                 ("length_m", value("tendon.length")?),
                 ("axial_stiffness_n", value("tendon.axial_stiffness")?),
@@ -91,15 +104,18 @@ pub fn text(
             ],
         ),
         (
-            "sheath",
+            Some("sheath"),
             vec![
                 ("wrap_angle_rad", value("sheath.wrap_angle")?),
                 ("friction_coefficient", value("sheath.friction_coefficient")?),
             ],
         ),
     ];
+    let mut text = String::new();
     for (section, keys) in sections {
-        let _ = writeln!(text, "\n[{section}]");
+        if let Some(section) = section {
+            let _ = writeln!(text, "\n[{section}]");
+        }
         for (key, value) in keys {
             let remark = if key == "inductance_h" { "  # not a parameter of the board" } else { "" };
             let _ = writeln!(text, "{key} = {value:?}{remark}");

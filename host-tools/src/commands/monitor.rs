@@ -10,10 +10,12 @@ use bowden_core::recording::Format;
 use bowden_host_link::LinkError;
 use bowden_host_link::capture::Capture;
 use bowden_host_link::conversion::Conversion;
+use bowden_host_link::evidence::Origin;
 use bowden_host_link::hub::{Hub, Next, Reader};
 use bowden_host_link::operator::{Desk, Plan, operate_through};
 use bowden_host_link::recorder::{Recorder, Tally};
 use bowden_host_link::replug::Replug;
+use bowden_host_link::rig_file::Weight;
 use bowden_host_link::session::Session;
 
 use super::course::{CourseArguments, run_seconds};
@@ -51,6 +53,12 @@ pub struct MonitorArguments {
     /// Recording to write meanwhile, of every tick in every state (.csv, .csv.gz, .mcap)
     #[arg(long, value_name = "REC.mcap")]
     record: Option<PathBuf>,
+    /// What is to be remembered; it stands in the recording
+    #[arg(long, value_name = "TEXT", requires = "record")]
+    note: Option<String>,
+    /// Weight on the arm and its distance from the axis, for the rig in the recording: the board does not know it
+    #[arg(long, value_name = "KG,M", requires = "record")]
+    load: Option<Weight>,
     #[command(flatten)]
     course: CourseArguments,
     /// Length of a run, s; otherwise until it is stopped
@@ -118,7 +126,9 @@ impl MonitorArguments {
         session: &Session,
     ) -> Result<Option<(Recorder, String)>, Failure> {
         let (Some(out), Some(format)) = (self.record.as_deref(), format) else { return Ok(None) };
-        let origin = super::origin();
+        let origin =
+            Origin { note: self.note.clone(), reference: Some(self.course.words()), ..super::origin() };
+        let name = out.file_stem().map_or("joint".into(), |name| name.to_string_lossy());
         let capture = Capture {
             out,
             format,
@@ -126,7 +136,7 @@ impl MonitorArguments {
             every: 1,
             seconds: None,
             origin: &origin,
-            rig: None,
+            rig: Some((&name, self.load)),
             replug: None,
         };
         Ok(Some((capture.recorder(session)?, out.display().to_string())))

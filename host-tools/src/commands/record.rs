@@ -11,7 +11,7 @@ use bowden_host_link::course::Course;
 use bowden_host_link::evidence::Origin;
 use bowden_host_link::raw_capture;
 use bowden_host_link::recorder::Tally;
-use bowden_host_link::rig_file::{self, Weight};
+use bowden_host_link::rig_file::{self, Draft, Weight};
 use bowden_host_link::session::{RunEnd, Session};
 use bowden_host_link::{LinkError, ParameterSet};
 use serde::Serialize;
@@ -60,8 +60,8 @@ pub struct RecordArguments {
     /// Write a rig file from the board's parameters, for `bowden diagnose` and the like
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
-    /// Weight on the arm and its distance from the axis, for the rig file: the board does not know it
-    #[arg(long, value_name = "KG,M", requires = "rig")]
+    /// Weight on the arm and its distance from the axis, for the rig file and the rig in the recording: the board does not know it
+    #[arg(long, value_name = "KG,M")]
     load: Option<Weight>,
     /// Print JSON: one object
     #[arg(long)]
@@ -136,7 +136,7 @@ impl RecordArguments {
             every: self.every,
             seconds,
             origin: &origin,
-            rig: self.rig.is_some().then_some((&name, self.load)),
+            rig: Some((&name, self.load)),
             replug: Some(&replug),
         };
         let (tally, end) = if self.raw {
@@ -147,8 +147,8 @@ impl RecordArguments {
 
         let parameters = session.parameters();
         if let Some(path) = &self.rig {
-            let text = rig_file::text(&name, parameters, tally.bus_v.unwrap_or_default(), self.load)?;
-            rig_file::save(path, &text)?;
+            let rig = Draft::new(&name, parameters, self.load)?;
+            rig_file::save(path, &rig.text(tally.bus_v.unwrap_or_default()))?;
         }
         let losses = *session.client().losses();
         self.conclude(&tally, end, seconds, tally.loss(&losses))

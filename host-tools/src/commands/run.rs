@@ -10,9 +10,12 @@ use bowden_host_link::Session;
 use bowden_host_link::bench_run::ledger::{Done, Ledger};
 use bowden_host_link::bench_run::plan_file::Plan;
 use bowden_host_link::bench_run::{Action, Item, Setting, carry_out, items};
+use bowden_host_link::evidence::Origin;
+use bowden_host_link::rig_file::Weight;
+use serde::Serialize;
 
 use super::port::PortArguments;
-use super::print;
+use super::{print, print_json};
 use crate::interrupt;
 
 /// Arguments of `bowden run`.
@@ -33,9 +36,40 @@ pub struct RunArguments {
     /// Format of the recordings
     #[arg(long, value_name = "ENDING", default_value = "mcap", value_parser = ["csv", "csv.gz", "mcap"])]
     format: String,
+    /// What is to be remembered of this run; it stands in every recording
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
+    /// Weight on the arm and its distance from the axis, for the rig in every recording: the board does not know it
+    #[arg(long, value_name = "KG,M")]
+    load: Option<Weight>,
     /// Show what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
+    /// Print JSON: one object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A plan that was not carried out.
+#[derive(Serialize)]
+struct Listed<'p> {
+    plan: &'p str,
+    steps: Vec<ListedStep<'p>>,
+}
+
+#[derive(Serialize)]
+struct ListedStep<'p> {
+    name: &'p str,
+    what: String,
+}
+
+/// A plan that was carried out.
+#[derive(Serialize)]
+struct Facts<'p> {
+    plan: &'p str,
+    /// Steps that were done before this start.
+    before: usize,
+    steps: &'p [Done],
 }
 
 impl RunArguments {
@@ -55,7 +89,12 @@ impl RunArguments {
         progress.stage("checking the plan", 0);
         let items = items(&plan, &session.parameters().control())?;
         if self.dry_run {
-            print(&format!("{}: {} steps\n{}", plan.name, items.len(), list(&items)))?;
+            if self.json {
+                let steps = items.iter().map(|item| ListedStep { name: &item.name, what: what(item) });
+                print_json(&Listed { plan: &plan.name, steps: steps.collect() })?;
+            } else {
+                print(&format!("{}: {} steps\n{}", plan.name, items.len(), list(&items)))?;
+            }
             return Ok(Outcome::done());
         }
         output::prepare_folder(&self.out, &[], &[&self.plan])?;
@@ -63,11 +102,12 @@ impl RunArguments {
         let board = format!("{} {}", greeting.board, greeting.serial).trim_end().to_owned();
         let mut ledger = Ledger::open(&self.out, &text, &board)?;
         let before = ledger.done().len();
-        let origin = super::origin();
+        let origin = Origin { note: self.note.clone(), ..super::origin() };
         let setting = Setting {
             folder: &self.out,
             ending: &self.format,
             origin: &origin,
+            load: self.load,
             text: &text,
             stop: &interrupt::requested,
             progress,
@@ -82,7 +122,11 @@ impl RunArguments {
                 output::describe(&error)
             ))
         })?;
-        print(&summary)?;
+        if self.json {
+            print_json(&Facts { plan: &plan.name, before, steps: ledger.done() })?;
+        } else {
+            print(&summary)?;
+        }
         let mut outcome = Outcome::done();
         let losses =
             ledger.done().iter().filter_map(|done| Some(format!("{}: {}", done.name, done.loss.as_ref()?)));
@@ -93,16 +137,17 @@ impl RunArguments {
 
 /// What would be done.
 fn list(items: &[Item]) -> String {
-    let line = |item: &Item| {
-        let what = match &item.action {
-            Action::PretensionCheck => "self test and pretension check".to_owned(),
-            Action::Home => "homing".to_owned(),
-            Action::Pause(pause) => format!("{} s, the bridge off", pause.as_secs_f64()),
-            Action::Follow(motion) => motion.words(),
-        };
-        format!("{:<24} {what}\n", item.name)
-    };
-    items.iter().map(line).collect()
+    items.iter().map(|item| format!("{:<24} {}\n", item.name, what(item))).collect()
+}
+
+/// What a step does, in words.
+fn what(item: &Item) -> String {
+    match &item.action {
+        Action::PretensionCheck => "self test and pretension check".to_owned(),
+        Action::Home => "homing".to_owned(),
+        Action::Pause(pause) => format!("{} s, the bridge off", pause.as_secs_f64()),
+        Action::Follow(motion) => motion.words(),
+    }
 }
 
 /// What was done.

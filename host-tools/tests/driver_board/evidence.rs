@@ -3,13 +3,19 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 use bowden_core::recording::{Metadata, ReadOptions, Recording};
+use bowden_core::rig::Rig;
 
 use crate::bowden;
+use crate::cuts::PATIENCE;
 use crate::fake::Fake;
 use crate::mishaps::Mishaps;
 use crate::pseudo_terminal::Terminal;
+use crate::screen::Screen;
+use crate::terminal::THOUSAND_ROWS;
 
 const RECORDING: &str = "bowden.recording";
 const END: &str = "bowden.end";
@@ -73,10 +79,8 @@ fn a_recording_says_when_with_what_and_by_whom_it_was_made() {
             (metadata.entry(END, "end"), metadata.entry(END, "samples_lost")),
             (Some("complete"), Some("0"))
         );
-        assert_eq!(
-            metadata.entry(END, "rig"),
-            Some(fs::read_to_string(place.join("rig.toml")).unwrap().as_str())
-        );
+        let rig = fs::read_to_string(place.join("rig.toml")).unwrap();
+        assert_eq!((said("rig"), metadata.entry(END, "rig")), (rig.as_str(), Some(rig.as_str())));
         assert_eq!(number(&metadata, "bowden.parameters", "tendon.pretension"), 30.0);
         let recording = Recording::load(&place.join(out), &ReadOptions::default()).unwrap();
         let first_s =
@@ -95,6 +99,78 @@ fn a_recording_says_when_with_what_and_by_whom_it_was_made() {
     let (status, _, stderr) = bowden(place, &["check", "f.csv"]);
     assert_eq!((status, stderr.lines().count()), (3, 1), "{stderr}");
     assert!(stderr.starts_with("bowden: f.recording.toml: "), "{stderr}");
+}
+
+/// Starts a command that records `file` of the fake board, and kills it in the middle, so that what it writes at the end is missing.
+fn cut(terminal: &Terminal, place: &Path, command: &str, arguments: &[&str], file: &str) {
+    let mut command_line = terminal.command(place, command, arguments);
+    let file = place.join(file);
+    let is_long = || fs::metadata(&file).is_ok_and(|file| file.len() > THOUSAND_ROWS);
+    let begun = Instant::now();
+    if command == "monitor" {
+        let mut screen = Screen::start(&command_line, 100, 30);
+        while !is_long() {
+            assert!(!screen.has_ended() && begun.elapsed() < PATIENCE, "{}", screen.text());
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        // Kills it.
+        drop(screen);
+        return;
+    }
+    let mut child = command_line.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    while !is_long() {
+        assert!(child.try_wait().unwrap().is_none() && begun.elapsed() < PATIENCE, "{command}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn a_killed_program_leaves_its_evidence_before_the_rows() {
+    let plan = "schema = \"bowden-plan/1\"\n[[step]]\nkind = \"follow\"\nreference = \"sine\"\namplitude = 0.2\nfrequency_hz = 0.5\nseconds = 600\n";
+    let course = ["--reference", "sine", "--amplitude", "0.2"];
+    for (command, arguments, file) in [
+        ("record", [&["--out", "a.mcap"][..], &course].concat(), "a.mcap"),
+        ("record", [&["--out", "b.csv"][..], &course].concat(), "b.csv"),
+        ("monitor", [&["--record", "c.mcap"][..], &course].concat(), "c.mcap"),
+        ("run", vec!["plan.toml", "--out", "out"], "out/01-sine.mcap"),
+    ] {
+        let terminal = Terminal::new(Fake::new(Mishaps::default()));
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path();
+        fs::write(place.join("plan.toml"), plan).unwrap();
+        let arguments = [&arguments[..], &["--note", "new tendon", "--load", "2.5,0.03"]].concat();
+        cut(&terminal, place, command, &arguments, file);
+        let (status, _, stderr) = bowden(place, &["recover", file, "--out", "whole.mcap"]);
+        assert!(matches!(status, 0 | 3), "{stderr}");
+        let metadata = metadata(&place.join("whole.mcap"));
+        assert_eq!(metadata.group(END), None, "{command}");
+        let said = |name: &str| {
+            metadata.entry(RECORDING, name).unwrap_or_else(|| panic!("{command} {file}: no {name}"))
+        };
+        assert_eq!(
+            (said("note"), said("board_serial"), said("firmware")),
+            ("new tendon", "0042002A", "9.8.7")
+        );
+        assert!(
+            said("reference").starts_with("sine of 0.2 rad at 0.5 Hz around 0 rad"),
+            "{}",
+            said("reference")
+        );
+        assert_eq!(number(&metadata, "bowden.parameters", "tendon.pretension"), 30.0);
+        assert!(!said("started_utc").is_empty() && !said("tool_revision").is_empty());
+        // The parameters of the fake, its supply of 2707 codes of 0.0088645 V, and the weight of the command line.
+        let rig = Rig::parse(said("rig"), "rig").unwrap();
+        let (tendon, pulleys) = (rig.joint.tendon.unwrap(), rig.joint.pulleys.unwrap());
+        assert_eq!((tendon.pretension_n, pulleys.input_radius_m), (30.0, 0.015));
+        for line in ["supply_v = 24.0", "mass_kg = 2.5", "arm_m = 0.03", "gear_ratio = 30.0"] {
+            assert!(said("rig").lines().any(|got| got == line), "{command}: {line} in {}", said("rig"));
+        }
+        if command == "run" {
+            assert_eq!((said("plan"), said("plan_step")), (plan, "01-sine"));
+        }
+    }
 }
 
 #[test]
