@@ -69,6 +69,13 @@ fn print_json(facts: &impl serde::Serialize) -> Result<(), Failure> {
     print(&(text + "\n"))
 }
 
+/// Writes facts to standard output as JSON in one line.
+fn print_json_line(facts: &impl serde::Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string(facts)
+        .map_err(|error| Failure::failed(format!("standard output: no JSON: {error}; please report this")))?;
+    print(&(text + "\n"))
+}
+
 /// The study that a command line names: a study file, or recordings with the rig of their bench.
 fn load_study(
     recordings: &[PathBuf],

@@ -99,9 +99,10 @@ fn play_is_found_and_made_up_for() {
 fn a_joint_that_conceals_nothing_is_left_as_it_is() {
     let folder = folder();
     let (status, stdout, stderr) =
-        run(folder.path(), "sim:seed=602", &["--yes", "--time", "48", "--format", "mcap"]);
+        run(folder.path(), "sim:seed=602", &["--yes", "--time", "48", "--format", "mcap", "--json"]);
     assert_eq!((status, stderr.as_str()), (0, ""), "{stdout}");
     let result = result(folder.path());
+    assert_eq!(serde_json::from_str::<Value>(&stdout).unwrap(), result);
     let last = result["rounds"].as_array().unwrap().last().unwrap();
     assert_eq!(last["diagnosis"]["verdict"], "consistent", "{stdout}");
     assert_eq!(last["diagnosis"]["effects"], Value::Array(Vec::new()));
@@ -128,6 +129,19 @@ fn nothing_moves_where_nobody_can_be_asked() {
         "{stdout}"
     );
     assert!(stdout.ends_with("nothing was moved and nothing was written\n"), "{stdout}");
+    let (status, stdout, stderr) = run(folder.path(), "sim", &["--dry-run", "--angle", "0.3", "--json"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let planned: Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!((&planned["schema"], &planned["stopped"]), (&"bowden-investigation/1".into(), &Value::Null));
+    assert_eq!(planned["recordings"], Value::Array(Vec::new()));
+    let runs = planned["plan"]["runs"].as_array().unwrap();
+    assert!(
+        runs.iter().all(|run| number(&run["amplitude_rad"]) <= 0.3) && runs[0]["form"] == "multisine",
+        "{planned}"
+    );
+    let (status, stdout, stderr) = run(folder.path(), "sim", &["--json"]);
+    assert_eq!((status, stdout.as_str(), stderr.lines().count()), (2, "", 1), "{stderr}");
+    assert!(stderr.starts_with("bowden: --json: nobody can be asked"), "{stderr}");
     assert_eq!(names(folder.path()), BTreeSet::from(["rig.toml".to_owned()]));
 }
 

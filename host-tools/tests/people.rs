@@ -115,6 +115,22 @@ fn facts_of_a_board_come_as_json() {
         (&faults["state"], &faults["fault"], &faults["board"]),
         (&"off".into(), &serde_json::Value::Null, &"simulated".into())
     );
+    assert_eq!(json(&["send", "--port", "sim", "ready", "--json"]), serde_json::json!({ "state": "ready" }));
+    // A rig with another pretension.
+    let rig = virtual_bench::nominal_rig_toml("bench").replace("pretension_n = 30.0", "pretension_n = 35.0");
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    let from_rig = ["params", "--port", "sim", "from-rig", "rig.toml", "--json"];
+    for (more, set) in [(&["--dry-run"][..], false), (&[], true)] {
+        let facts = json(&[&from_rig[..], more].concat());
+        let changes = facts["changes"].as_array().unwrap();
+        let pretension = changes.iter().find(|change| change["parameter"] == "tendon.pretension").unwrap();
+        assert_eq!(facts["set"], set);
+        assert_eq!(
+            *pretension,
+            serde_json::json!({ "parameter": "tendon.pretension", "old": 30.0, "new": 35.0, "unit": "N", "from": "tendon.pretension_n" })
+        );
+        assert!(facts["unused"].is_array() && facts["limited"].is_array(), "{facts}");
+    }
     let (status, _, stderr) = bowden(folder.path(), &["params", "--port", "sim", "store", "--json"]);
     assert_eq!((status, stderr.lines().count()), (2, 1), "{stderr}");
 }

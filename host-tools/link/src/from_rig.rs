@@ -20,15 +20,18 @@ use bowden_core::outcome::Failure;
 use bowden_core::rig::Rig;
 use bowden_model::effect::ActiveEffect;
 use draft::Draft;
+use serde::Serialize;
 
 use super::parameters::ParameterSet;
 
-/// A parameter that gets another value.
-#[derive(Clone, Debug, PartialEq)]
+/// A parameter that gets another value; as JSON with the keys of `investigation.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// Index of the parameter.
+    #[serde(skip)]
     pub index: u16,
     /// Name of the parameter.
+    #[serde(rename = "parameter")]
     pub name: String,
     /// Value on the board.
     pub old: f32,
@@ -37,11 +40,12 @@ pub struct Change {
     /// Unit of both, empty for a bare number.
     pub unit: String,
     /// Keys of the rig file that the new value comes from.
+    #[serde(rename = "from")]
     pub sources: String,
 }
 
 /// Something that does not act in full: a part of the rig that the board cannot use, or a limit of the board.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Unused {
     /// Key of the rig file, or parameter of the board.
     pub source: String,
@@ -50,7 +54,7 @@ pub struct Unused {
 }
 
 /// What a rig file changes on a board.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Transfer {
     /// Parameters to set, in the board's order; all within their ranges.
     pub changes: Vec<Change>,

@@ -77,6 +77,14 @@ pub trait Dialog {
     /// When it cannot be shown.
     fn show(&self, text: &str) -> Result<(), Failure>;
 
+    /// Shows how far an investigation came, at its end or behind its plan; `text` says the same in words.
+    ///
+    /// # Errors
+    /// When it cannot be shown.
+    fn conclude(&self, _investigation: &Investigation, text: &str) -> Result<(), Failure> {
+        self.show(text)
+    }
+
     /// Whether something may happen.
     ///
     /// # Errors
@@ -106,15 +114,16 @@ pub fn investigate(
         setup.rig.display(),
         plan.table()
     ))?;
+    let mut account = Investigation::new(&rig.name, session.parameters(), plan);
     if setup.dry_run {
-        return dialog.show("dry run: nothing was moved and nothing was written\n").map(|()| Outcome::done());
+        dialog.conclude(&account, "dry run: nothing was moved and nothing was written\n")?;
+        return Ok(Outcome::done());
     }
     if !dialog.may("Move the joint along these references?")? {
         return Err(Failure::failed("not confirmed: nothing was moved and nothing was written"));
     }
     output::prepare_folder(setup.folder, &[], &[])?;
     let rig_text = std::fs::read_to_string(setup.rig).unwrap_or_default();
-    let mut account = Investigation::new(&rig.name, session.parameters(), plan);
     let driver = Driver {
         session,
         folder: setup.folder,
@@ -145,7 +154,7 @@ pub fn investigate(
     }
     let page = files::save(&account, setup.folder)?;
     off?;
-    dialog.show(&format!("{}\n{}\n", account.conclusion(), page.display()))?;
+    dialog.conclude(&account, &format!("{}\n{}\n", account.conclusion(), page.display()))?;
     let mut outcome = Outcome::done();
     outcome.extend(work.driver.notes);
     Ok(outcome)

@@ -8,11 +8,12 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::progress::Progress;
 use bowden_core::rig::Rig;
+use bowden_host_link::investigate::report::Investigation;
 use bowden_host_link::investigate::{Dialog, Setup, investigate};
 
 use super::limits::LimitArguments;
 use super::port::PortArguments;
-use super::print;
+use super::{print, print_json};
 use crate::interrupt;
 use crate::progress::UntilInterrupted;
 
@@ -47,6 +48,9 @@ pub struct InvestigateArguments {
     /// Show references and limits; move nothing, write nothing
     #[arg(long)]
     dry_run: bool,
+    /// Print JSON: the object of investigation.json. Nobody is asked: with --yes or --dry-run only
+    #[arg(long)]
+    json: bool,
 }
 
 /// Says yes to everything.
@@ -55,6 +59,23 @@ struct Yes;
 impl Dialog for Yes {
     fn show(&self, text: &str) -> Result<(), Failure> {
         print(text)
+    }
+
+    fn may(&self, _question: &str) -> Result<bool, Failure> {
+        Ok(true)
+    }
+}
+
+/// Says yes to everything, and shows nothing but the result.
+struct Json;
+
+impl Dialog for Json {
+    fn show(&self, _text: &str) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn conclude(&self, investigation: &Investigation, _text: &str) -> Result<(), Failure> {
+        print_json(investigation)
     }
 
     fn may(&self, _question: &str) -> Result<bool, Failure> {
@@ -83,8 +104,18 @@ impl InvestigateArguments {
     /// # Errors
     /// As [`investigate`]; also exit status 2 if nobody can be asked, or the folder holds something.
     pub fn run(&self, progress: &dyn Progress) -> Result<Outcome, Failure> {
-        let dialog: &dyn Dialog = if self.yes || self.dry_run { &Yes } else { &AtTerminal };
-        if !self.yes && !self.dry_run && !io::stdin().is_terminal() {
+        let asks = !self.yes && !self.dry_run;
+        if self.json && asks {
+            return Err(Failure::bad_input(
+                "--json: nobody can be asked before the joint moves; add --yes, or --dry-run to see what it would do",
+            ));
+        }
+        let dialog: &dyn Dialog = match (self.json, asks) {
+            (true, _) => &Json,
+            (false, true) => &AtTerminal,
+            (false, false) => &Yes,
+        };
+        if asks && !io::stdin().is_terminal() {
             return Err(Failure::bad_input(
                 "investigate moves the joint, and there is no terminal to ask at; nothing was moved; say --yes, or --dry-run to \
                  see what it would do",

@@ -10,6 +10,7 @@ use bowden_core::output;
 use bowden_core::rig::Rig;
 use bowden_host_link::from_rig::Transfer;
 use bowden_host_link::{Client, ParameterSet};
+use serde::Serialize;
 use table::TableArguments;
 
 use super::port::PortArguments;
@@ -27,7 +28,7 @@ use super::{print, print_json};
 pub struct ParamsArguments {
     #[command(flatten)]
     port: PortArguments,
-    /// Print JSON: `list` and `get` one array, one object a parameter; `table` one object, or null
+    /// Print JSON: `list` and `get` one array, one object a parameter; `from-rig` one object; `table` one object, or null
     #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]
@@ -85,17 +86,32 @@ struct FromRig {
     dry_run: bool,
 }
 
+/// What a rig changes.
+#[derive(Serialize)]
+struct Transferred {
+    /// Whether it is on the board.
+    set: bool,
+    #[serde(flatten)]
+    transfer: Transfer,
+}
+
 impl FromRig {
     /// Shows what the rig changes, then sets it, all or nothing.
-    fn run(&self, client: &mut Client, parameters: &ParameterSet) -> Result<(), Failure> {
+    fn run(&self, client: &mut Client, parameters: &ParameterSet, json: bool) -> Result<(), Failure> {
         let rig = Rig::load(&self.rig)?;
         let recorded = match &self.recorded_with {
             Some(file) => parameters.load(file)?,
             None => Vec::new(),
         };
         let transfer = Transfer::new(&rig, &self.rig.display().to_string(), parameters, &recorded)?;
-        print(&transfer.table())?;
         let values = transfer.values();
+        if json {
+            if !self.dry_run {
+                parameters.replace(client, &values)?;
+            }
+            return print_json(&Transferred { set: !self.dry_run, transfer });
+        }
+        print(&transfer.table())?;
         let count = match values.len() {
             1 => "1 parameter".to_owned(),
             count => format!("{count} parameters"),
@@ -115,13 +131,13 @@ impl ParamsArguments {
     /// Exit status 2, if a name, value, file or the port is not usable; 1, if the board refused or the link broke.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let tells = match &self.action {
-            None | Some(Action::List | Action::Get { .. }) => true,
+            None | Some(Action::List | Action::Get { .. } | Action::FromRig(_)) => true,
             Some(Action::Table(table)) => table.only_shows(),
             _ => false,
         };
         if self.json && !tells {
             return Err(Failure::bad_input(
-                "--json: only `list`, `get` and `table` by itself print facts; leave it out",
+                "--json: only `list`, `get`, `from-rig` and `table` by itself print facts; leave it out",
             ));
         }
         match &self.action {
@@ -147,7 +163,7 @@ impl ParamsArguments {
                 let values = parameters.load(file)?;
                 parameters.write(&mut client, &values)?;
             }
-            Action::FromRig(from_rig) => from_rig.run(&mut client, &parameters)?,
+            Action::FromRig(from_rig) => from_rig.run(&mut client, &parameters, self.json)?,
             Action::Save { file } => {
                 let text = parameters.to_toml();
                 output::write_file(file, |file| file.write_all(text.as_bytes()))?;

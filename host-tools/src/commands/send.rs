@@ -7,11 +7,12 @@ use bowden_host_link::LinkError;
 use bowden_host_link::recorder::tick_time_s;
 use bowden_host_link::session::{RunEnd, RunTick, Session};
 use bowden_link::Limit;
+use serde::Serialize;
 
 use super::course::{CourseArguments, run_seconds};
 use super::faults::{StatusFacts, describe};
 use super::port::PortArguments;
-use super::{print, print_json};
+use super::{print, print_json, print_json_line};
 use crate::interrupt;
 
 /// Arguments of `bowden send`.
@@ -24,6 +25,9 @@ use crate::interrupt;
 pub struct SendArguments {
     #[command(flatten)]
     port: PortArguments,
+    /// Print JSON: one object; `run` one object a line, twice a second
+    #[arg(long, global = true)]
+    json: bool,
     #[command(subcommand)]
     action: Action,
 }
@@ -46,11 +50,7 @@ enum Action {
         seconds: Option<f64>,
     },
     /// Print state, fault, limits and counters
-    Status {
-        /// Print JSON: one object
-        #[arg(long)]
-        json: bool,
-    },
+    Status,
     /// From off or fault: leave the firmware for the processor's own boot loader, which takes a new image over USB
     BootLoader,
 }
@@ -67,9 +67,9 @@ impl SendArguments {
     pub fn run(&self) -> Result<Outcome, Failure> {
         interrupt::catch()?;
         let stop = &interrupt::requested;
-        if let Action::Status { json } = self.action {
+        if let Action::Status = self.action {
             let status = self.port.connect()?.status()?;
-            if json {
+            if self.json {
                 print_json(&StatusFacts::from(&status))?;
             } else {
                 print(&describe(&status))?;
@@ -81,9 +81,13 @@ impl SendArguments {
         }
         if let Action::BootLoader = self.action {
             self.port.connect()?.enter_boot_loader()?;
-            print(
-                "the board is in its boot loader (USB 0483:df11); flash it, or switch it off and on to leave\n",
-            )?;
+            if self.json {
+                print_json(&InBootLoader { state: "boot loader", usb: "0483:df11" })?;
+            } else {
+                print(
+                    "the board is in its boot loader (USB 0483:df11); flash it, or switch it off and on to leave\n",
+                )?;
+            }
             return Ok(Outcome::done());
         }
         let mut session = Session::new(self.port.connect()?)?;
@@ -93,7 +97,11 @@ impl SendArguments {
             _ => session.off()?,
         }
         let state = session.client().status()?.state;
-        print(&format!("state: {state}\n"))?;
+        if self.json {
+            print_json(&Reached { state: state.to_string() })?;
+        } else {
+            print(&format!("state: {state}\n"))?;
+        }
         Ok(Outcome::done())
     }
 
@@ -109,7 +117,8 @@ impl SendArguments {
             if run_s >= next_line_s {
                 next_line_s += LINE_INTERVAL_S;
                 // A standard output that is gone does not stop the joint in the middle.
-                let _ = print(&line(run_s, tick, &conversion));
+                let at = Position::new(run_s, tick, &conversion);
+                let _ = if self.json { print_json_line(&at) } else { print(&at.line()) };
             }
             if seconds.is_some_and(|seconds| run_s >= seconds - 5e-10) {
                 ControlFlow::Break(())
@@ -127,17 +136,59 @@ impl SendArguments {
     }
 }
 
+/// State in which a step has left the board.
+#[derive(Serialize)]
+struct Reached {
+    state: String,
+}
+
+/// A board that has left its firmware.
+#[derive(Serialize)]
+struct InBootLoader {
+    state: &'static str,
+    /// Vendor and product.
+    usb: &'static str,
+}
+
 /// Where the joint is.
-fn line(run_s: f64, tick: &RunTick, conversion: &bowden_host_link::conversion::Conversion) -> String {
-    let sample = &tick.sample;
-    let [theta_in_rad, theta_out_rad] = conversion.angles_rad(sample);
-    let [f1, f2, f3, f4] = conversion.tensions_n(sample);
-    let limits: Vec<&str> =
-        Limit::ALL.into_iter().filter(|limit| sample.limits.contains(*limit)).map(Limit::title).collect();
-    let limits = if limits.is_empty() { String::new() } else { format!("; {}", limits.join(", ")) };
-    format!(
-        "{run_s:8.3} s  {}  joint {theta_out_rad:+.4} rad, pulley {theta_in_rad:+.4} rad, tensions {f1:.1} {f2:.1} {f3:.1} \
-         {f4:.1} N{limits}\n",
-        sample.state
-    )
+#[derive(Serialize)]
+struct Position {
+    /// Time since the run began, s.
+    run_s: f64,
+    state: String,
+    theta_out_rad: f64,
+    theta_in_rad: f64,
+    /// f1 to f4, N.
+    tensions_n: [f64; 4],
+    /// Limits that act.
+    limits: Vec<&'static str>,
+}
+
+impl Position {
+    fn new(run_s: f64, tick: &RunTick, conversion: &bowden_host_link::conversion::Conversion) -> Self {
+        let sample = &tick.sample;
+        let [theta_in_rad, theta_out_rad] = conversion.angles_rad(sample);
+        Self {
+            run_s,
+            state: sample.state.to_string(),
+            theta_out_rad,
+            theta_in_rad,
+            tensions_n: conversion.tensions_n(sample),
+            limits: Limit::ALL
+                .into_iter()
+                .filter(|limit| sample.limits.contains(*limit))
+                .map(Limit::title)
+                .collect(),
+        }
+    }
+
+    /// For people.
+    fn line(&self) -> String {
+        let Self { run_s, state, theta_out_rad, theta_in_rad, tensions_n: [f1, f2, f3, f4], limits } = self;
+        let limits = if limits.is_empty() { String::new() } else { format!("; {}", limits.join(", ")) };
+        format!(
+            "{run_s:8.3} s  {state}  joint {theta_out_rad:+.4} rad, pulley {theta_in_rad:+.4} rad, tensions {f1:.1} {f2:.1} {f3:.1} \
+             {f4:.1} N{limits}\n"
+        )
+    }
 }

@@ -6,6 +6,7 @@ use std::process::Stdio;
 use std::time::Instant;
 
 use bowden_core::recording::{ReadOptions, Recording};
+use bowden_model::channel::Channel;
 use serde_json::Value;
 
 use crate::cuts::PATIENCE;
@@ -82,6 +83,15 @@ fn a_plan_is_carried_out_with_a_recording_each_and_a_summary() {
         "{stdout}"
     );
     assert_eq!(fs::read_to_string(folder.path().join("out/summary.txt")).unwrap(), stdout);
+    // The same as JSON, of a start that finds nothing to do.
+    let (status, facts, stderr) = run(folder.path(), PLAN, &["--json"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let facts: Value = serde_json::from_str(&facts).unwrap();
+    assert_eq!((&facts["plan"], &facts["before"]), (&"check".into(), &6.into()));
+    let written: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("out/run.json")).unwrap()).unwrap();
+    assert_eq!(facts["steps"], written["done"]);
+    assert_eq!(facts["steps"][4]["file"], "05-sine-2.mcap");
     // Each recording says which step of which plan it is, and holds what the step asked for.
     let recording =
         Recording::load(&folder.path().join("out/05-sine-2.mcap"), &ReadOptions::default()).unwrap();
@@ -267,6 +277,42 @@ fn what_a_plan_may_not_ask_is_said_with_its_place_before_anything_moves() {
 }
 
 #[test]
+fn an_excitation_is_carried_out_as_it_was_listed_and_another_rig_gets_another_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    let rig = virtual_bench::nominal_rig_toml("bench");
+    fs::write(place.join("rig.toml"), &rig).unwrap();
+    let plan = "schema = \"bowden-plan/1\"\n[limits]\nangle_rad = 0.3\n[[step]]\nkind = \"excite\"\nrig = \"rig.toml\"\nseconds = 6\n";
+    let listed = || -> Vec<[String; 2]> {
+        let (status, stdout, stderr) = run(place, plan, &["--dry-run", "--json"]);
+        assert_eq!((status, stderr.as_str()), (0, ""));
+        let facts: Value = serde_json::from_str(&stdout).unwrap();
+        let steps = facts["steps"].as_array().unwrap();
+        steps.iter().map(|step| ["name", "what"].map(|key| step[key].as_str().unwrap().to_owned())).collect()
+    };
+    let steps = listed();
+    let (status, stdout, stderr) = run(place, plan, &[]);
+    assert_eq!((status, stderr.as_str()), (0, ""), "{stdout}");
+    let expected: Vec<(String, u64)> = steps.iter().map(|[name, _]| (name.clone(), 20_000)).collect();
+    assert_eq!(ledger(place), expected);
+    for [name, what] in &steps {
+        let path = place.join(format!("out/{name}.mcap"));
+        let recording = Recording::load(&path, &ReadOptions::default()).unwrap();
+        assert_eq!(recording.metadata().entry("bowden.recording", "reference"), Some(what.as_str()));
+        // The joint goes as far as the words say, and no farther than the plan allows but for its overshoot.
+        let amplitude: f64 = what.split(" of ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        let angles = recording.channel(Channel::ThetaOut).unwrap();
+        let largest = angles.iter().fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
+        assert!(largest > 0.7 * amplitude && largest < 1.1 * 0.3, "{what}: {largest} rad");
+    }
+    // A light weight on a long arm, on tendons that give way.
+    let other = rig.replace("axial_stiffness_n = 72900.0", "axial_stiffness_n = 8000.0");
+    assert_ne!(rig, other);
+    fs::write(place.join("rig.toml"), other).unwrap();
+    assert_ne!(listed(), steps);
+}
+
+#[test]
 fn an_excitation_is_chosen_for_the_rig() {
     let folder = tempfile::tempdir().unwrap();
     let rig = [
@@ -295,6 +341,17 @@ fn an_excitation_is_chosen_for_the_rig() {
     }
     assert!(lines[0][2..] != lines[1][2..] && lines[1][2..] != lines[2][2..], "{stdout}");
     assert!(!folder.path().join("out").exists());
+    let (status, facts, _) = run(folder.path(), plan, &["--dry-run", "--json"]);
+    let facts: Value = serde_json::from_str(&facts).unwrap();
+    let steps = facts["steps"].as_array().unwrap();
+    let said = steps.iter().map(|step| {
+        let [name, what] = ["name", "what"].map(|key| step[key].as_str().unwrap());
+        format!("{name:<24} {what}")
+    });
+    assert_eq!(
+        (status, said.collect::<Vec<_>>()),
+        (0, lines.iter().map(|line| (*line).to_owned()).collect())
+    );
     let (_, _, stderr) = run(folder.path(), &plan.replace("seconds = 9", "seconds = 3"), &["--dry-run"]);
     assert!(
         stderr.starts_with("bowden: plan.toml:4:1: 3 s are too short for 3 motions; give 6 s or more"),

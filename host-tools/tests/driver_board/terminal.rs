@@ -320,6 +320,36 @@ fn single_steps_lead_from_state_to_state() {
     assert_eq!(terminal.fake().violations, [""; 0]);
 }
 
+#[test]
+fn single_steps_come_as_json() {
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    let folder = tempfile::tempdir().unwrap();
+    let send = |arguments: &[&str]| {
+        let (status, stdout, stderr) =
+            terminal.bowden(folder.path(), "send", &[arguments, &["--json"]].concat());
+        assert_eq!((status, stderr.as_str()), (0, ""), "{arguments:?}");
+        stdout
+    };
+    let whole = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
+    for (step, state) in [("ready", "ready"), ("home", "ready"), ("off", "off")] {
+        assert_eq!(whole(&send(&[step])), serde_json::json!({ "state": state }));
+    }
+    send(&["ready"]);
+    let lines = send(&["run", "--seconds", "0.8", "--reference", "sine", "--amplitude", "0.2"]);
+    let lines: Vec<serde_json::Value> = lines.lines().map(whole).collect();
+    assert_eq!(
+        (lines.len(), lines[0]["run_s"].as_f64(), lines[1]["run_s"].as_f64()),
+        (2, Some(0.0), Some(0.5))
+    );
+    for line in &lines {
+        // f4 of the fake is 829.5 codes of 0.035037 N; its joint is up to 300 counts of 4096 from its zero.
+        let f4_n = line["tensions_n"][3].as_f64().unwrap();
+        let joint_rad = line["theta_out_rad"].as_f64().unwrap();
+        assert!(line["state"] == "run" && (f4_n - 29.0632).abs() < 1e-3, "{line}");
+        assert!((0.0..0.4602).contains(&joint_rad) && line["limits"].is_array(), "{line}");
+    }
+}
+
 /// Bytes of a recording that holds more than 1000 rows in either format: a row of CSV takes less than 250, one of MCAP less.
 pub const THOUSAND_ROWS: u64 = 250_000;
 
