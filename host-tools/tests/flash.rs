@@ -211,3 +211,37 @@ fn a_boot_loader_that_is_not_there_is_said_with_what_to_do() {
         "while the board is switched on",
     );
 }
+
+#[test]
+fn the_log_of_a_running_board_needs_an_image_with_a_place_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.elf"), Elf::firmware().bytes()).unwrap();
+    fs::write(folder.path().join("a.rtt"), "").unwrap();
+    let see_help = "see `bowden --help`";
+    refused(
+        folder.path(),
+        &["log", "a.elf"],
+        "the following required arguments were not provided: <LOG>",
+        see_help,
+    );
+    refused(
+        folder.path(),
+        &["log", "a.elf", "a.rtt", "--probe"],
+        "the argument '[LOG]' cannot be used with",
+        see_help,
+    );
+    refused(
+        folder.path(),
+        &["log", "a.elf", "--probe", "ST-LINK"],
+        "invalid value 'ST-LINK' for '--probe",
+        see_help,
+    );
+    refused(
+        folder.path(),
+        &["log", "gone.elf", "--probe", NO_PROBE],
+        "gone.elf: ",
+        "; name the firmware's ELF",
+    );
+    // The words that follow are those of `LogImage`, or of the place of the log.
+    refused(folder.path(), &["log", "a.elf", "--probe", NO_PROBE], "a.elf: ", "");
+}

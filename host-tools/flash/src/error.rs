@@ -151,6 +151,26 @@ pub enum FlashError {
         /// Whether the image before is whole.
         whole: bool,
     },
+    /// The flash holds another image than the one whose log is to be read.
+    #[error(
+        "the board runs another image: byte {found:#04x} at address {address:#010x}, the ELF has {expected:#04x}; give the ELF that was flashed"
+    )]
+    OtherImage {
+        /// First address that differs.
+        address: u32,
+        /// What is there.
+        found: u8,
+        /// What the ELF has.
+        expected: u8,
+    },
+    /// The probe or the way to the chip failed while nothing but reading was done.
+    #[error("{during}: {reason}; check the board's supply and the cable, then start again")]
+    Unread {
+        /// What was done.
+        during: String,
+        /// What the probe says.
+        reason: String,
+    },
     /// The firmware does not log.
     #[error(
         "the firmware started, but there is no log after {seconds} s; see `bowden faults`, and whether the ELF is the one that was flashed"
@@ -202,7 +222,8 @@ impl From<FlashError> for Failure {
             | FlashError::OtherBootLoaders { .. }
             | FlashError::NotAllowed { .. }
             | FlashError::Unusable { .. }
-            | FlashError::OtherChip { .. } => Self::bad_input(error),
+            | FlashError::OtherChip { .. }
+            | FlashError::OtherImage { .. } => Self::bad_input(error),
             _ => Self::failed(error),
         }
     }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`find`](mod@find) | which of the probes that are plugged in |
 //! | [`target`] | the board behind it: whether it is the right one, and an image into it |
-//! | [`log`] | what its firmware logs from then on |
+//! | [`log`] | what its firmware logs |
 
 pub mod find;
 pub mod log;

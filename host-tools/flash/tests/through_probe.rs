@@ -158,6 +158,7 @@ fn the_log_is_read_from_the_start_of_the_image_on() {
     assert_eq!(image.rtt(), Some(BLOCK));
     let mut target = Target::attach(Port::plug(&chip, &Arc::default(), None)).unwrap();
     target.write(&image, true, &Quiet).unwrap();
+    let before = (chip.lock().unwrap().halts, chip.lock().unwrap().resets);
     let got = Mutex::new(Vec::new());
     let stop = || got.lock().unwrap().len() >= logged.len();
     target
@@ -167,6 +168,55 @@ fn the_log_is_read_from_the_start_of_the_image_on() {
         })
         .unwrap();
     assert!(*got.lock().unwrap() == logged);
+    let chip = chip.lock().unwrap();
+    assert_eq!((chip.halts, chip.resets), before);
+}
+
+#[test]
+fn the_log_of_a_board_that_runs_is_read_without_a_write_or_a_reset() {
+    let chip = chip();
+    let logged: Vec<u8> = (0..700_u32).map(|at| (at * 5) as u8).collect();
+    {
+        let mut chip = chip.lock().unwrap();
+        for run in image().runs() {
+            let from = (run.address - 0x0800_0000) as usize;
+            chip.flash.content[from..from + run.bytes.len()].copy_from_slice(&run.bytes);
+        }
+        chip.log = Some((BLOCK, logged.clone()));
+        chip.begin_log();
+    }
+    let before = chip.lock().unwrap().flash.content.clone();
+    let attach = || Target::attach(Port::plug(&chip, &Arc::default(), None)).unwrap();
+    let target = attach();
+    // probe-rs halts the core for a moment when it attaches, and nobody does from then on.
+    let halts = chip.lock().unwrap().halts;
+    let target = target.holding(&image()).unwrap();
+    assert!(chip.lock().unwrap().is_debugged());
+    let got = Mutex::new(Vec::new());
+    let stop = || got.lock().unwrap().len() >= logged.len();
+    target
+        .follow_log(BLOCK, &stop, &mut |bytes| {
+            got.lock().unwrap().extend_from_slice(bytes);
+            Ok(())
+        })
+        .unwrap();
+    assert!(*got.lock().unwrap() == logged);
+    assert!(chip.lock().unwrap().flash.content == before);
+    let runs_on = |halts: usize| {
+        let chip = chip.lock().unwrap();
+        assert_eq!((chip.halts, chip.resets, chip.halted), (halts, 0, false));
+        assert!(chip.flash.erased.is_empty());
+        // A fault of the firmware is not caught for a debugger that has left.
+        assert!(!chip.is_debugged());
+    };
+    runs_on(halts);
+    // The log of another image would be words at random.
+    chip.lock().unwrap().flash.content[0x1002] ^= 4;
+    let target = attach();
+    let halts = chip.lock().unwrap().halts;
+    let error = target.holding(&image()).err();
+    assert_eq!(error, Some(FlashError::OtherImage { address: 0x0800_1002, found: 0x1a, expected: 0x1e }));
+    runs_on(halts);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use bowden_host_link::{LinkError, SIM};
 use serde::Serialize;
 
 use super::log::LogFormat;
-use super::print;
+use super::{print, print_json_line};
 use crate::interrupt;
 use crate::progress::UntilInterrupted;
 
@@ -97,7 +97,7 @@ impl FlashArguments {
         progress.stage("running", 0);
         self.say(&image, found.name, started)?;
         match log {
-            Some((words, rtt)) => self.follow(&mut target, &words, rtt),
+            Some((words, rtt)) => follow(target, &words, rtt, &self.format),
             None => Ok(Outcome::done()),
         }
     }
@@ -128,34 +128,37 @@ impl FlashArguments {
             verified: true,
         };
         if self.format.json {
-            let text = serde_json::to_string(&written).map_err(|error| {
-                Failure::failed(format!("standard output: no JSON: {error}; please report this"))
-            })?;
-            return print(&(text + "\n"));
+            return print_json_line(&written);
         }
         let Written { image, through, bytes, seconds, .. } = written;
         print(&format!(
             "{image}: {bytes} bytes written and verified in {seconds:.1} s through {through}; the board was reset and runs it\n"
         ))
     }
-
-    fn follow(&self, target: &mut Target, words: &LogImage, rtt: u32) -> Result<Outcome, Failure> {
-        let mut decoder = LogDecoder::new(words);
-        target
-            .follow_log(rtt, &interrupt::requested, &mut |bytes| self.format.print(&decoder.take(bytes)?))?;
-        let mut outcome = Outcome::done();
-        // The last frame is cut where Ctrl-C came; that is no loss.
-        if !interrupt::requested() {
-            outcome.extend(decoder.finish()?);
-        }
-        Ok(outcome)
-    }
 }
 
-fn rtt(name: &str, image: &Image) -> Result<u32, Failure> {
+/// Prints the log of a board that runs until Ctrl-C.
+pub(super) fn follow(
+    target: Target,
+    words: &LogImage,
+    rtt: u32,
+    format: &LogFormat,
+) -> Result<Outcome, Failure> {
+    let mut decoder = LogDecoder::new(words);
+    target.follow_log(rtt, &interrupt::requested, &mut |bytes| format.print(&decoder.take(bytes)?))?;
+    let mut outcome = Outcome::done();
+    // The last frame is cut where Ctrl-C came; that is no loss.
+    if !interrupt::requested() {
+        outcome.extend(decoder.finish()?);
+    }
+    Ok(outcome)
+}
+
+/// Address of the log of an image.
+pub(super) fn rtt(name: &str, image: &Image) -> Result<u32, Failure> {
     image.rtt().ok_or_else(|| {
         Failure::bad_input(format!(
-            "{name}: it has no place for its log (symbol _SEGGER_RTT); leave out --log, or give an ELF with symbols"
+            "{name}: it has no place for its log (symbol _SEGGER_RTT); give an ELF with symbols, or leave out the log"
         ))
     })
 }
@@ -196,7 +199,7 @@ impl From<LinkError> for Sent {
 }
 
 /// One line, with the rule that lets this user open a device where that is what is missing.
-fn failure(error: FlashError) -> Failure {
+pub(super) fn failure(error: FlashError) -> Failure {
     match error {
         FlashError::NotAllowed { vendor, .. } => {
             let rule = udev_rule("usb", vendor, None);

@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
+use bowden_flash::image::{Image, Kind};
+use bowden_flash::probe::find::selector;
+use bowden_flash::probe::{self, DebugProbeSelector, Lister, Target};
 use bowden_host_link::firmware_log::{LogDecoder, LogImage, LogLine};
 
-use super::print;
+use super::{flash, print, print_json_line};
 use crate::interrupt;
 
 /// Bytes that are read at once.
@@ -28,13 +31,21 @@ enum Level {
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "A line is the time since the board's start in seconds, the level, and the words. LOG holds the bytes of the first RTT \
-                  channel as they came from a debug probe or from `bowden-board run --log`."
+                  channel as they came from a debug probe or from `bowden-board run --log`. With --probe the log comes from a board that runs, \
+                  from what its buffer holds on, until Ctrl-C: nothing is written to the flash, and the processor is not reset. Attaching halts it for a moment, which stops a joint that \
+                  moves."
 )]
 pub struct LogArguments {
     /// ELF that the firmware was flashed from
     elf: PathBuf,
     /// File of logged bytes; `-` for standard input
-    log: PathBuf,
+    #[arg(required_unless_present = "probe", conflicts_with = "probe")]
+    log: Option<PathBuf>,
+    /// Read the log of the running board through its debug probe, in place of LOG; where several probes are connected, vendor, product and
+    /// serial number of it
+    #[arg(long, value_name = "VID:PID[:SERIAL]", num_args = 0..=1, value_parser = selector)]
+    #[expect(clippy::option_option, reason = "asked for or not, and by name or not")]
+    probe: Option<Option<DebugProbeSelector>>,
     #[command(flatten)]
     format: LogFormat,
 }
@@ -57,13 +68,25 @@ impl LogArguments {
     /// Exit status 2: a file that cannot be read, an ELF without log, or the ELF of another firmware.
     pub fn run(&self) -> Result<Outcome, Failure> {
         interrupt::catch()?;
+        let Some(log) = &self.log else { return self.follow(self.probe.as_ref().and_then(Option::as_ref)) };
         let image = load_image(&self.elf)?;
         let mut decoder = LogDecoder::new(&image);
-        let name = self.log.display();
-        each_piece(&self.log, |bytes| self.format.print(&decoder.take(bytes)?))?;
+        let name = log.display();
+        each_piece(log, |bytes| self.format.print(&decoder.take(bytes)?))?;
         let mut outcome = Outcome::done();
         outcome.extend(decoder.finish()?.map(|note| format!("{name}: {note}")));
         Ok(outcome)
+    }
+
+    /// The same from a board that runs.
+    fn follow(&self, probe: Option<&DebugProbeSelector>) -> Result<Outcome, Failure> {
+        let (name, elf) = read_elf(&self.elf)?;
+        let words = LogImage::parse(&name, &elf)?;
+        let image = Image::parse(&name, &elf, Kind::Any)?;
+        let rtt = flash::rtt(&name, &image)?;
+        let found = probe::find(&Lister::new(), probe).map_err(flash::failure)?;
+        let target = Target::attach(found.probe).map_err(flash::failure)?.holding(&image)?;
+        flash::follow(target, &words, rtt, &self.format)
     }
 }
 
@@ -92,10 +115,7 @@ impl LogFormat {
         if !self.json {
             return print(&format!("{line}\n"));
         }
-        let text = serde_json::to_string(line).map_err(|error| {
-            Failure::failed(format!("standard output: no JSON: {error}; please report this"))
-        })?;
-        print(&(text + "\n"))
+        print_json_line(line)
     }
 }
 
@@ -104,11 +124,17 @@ impl LogFormat {
 /// # Errors
 /// Exit status 2: the file cannot be read, or see [`LogImage::parse`].
 pub(super) fn load_image(elf: &Path) -> Result<LogImage, Failure> {
+    let (name, bytes) = read_elf(elf)?;
+    LogImage::parse(&name, &bytes)
+}
+
+/// Name and bytes of an ELF.
+fn read_elf(elf: &Path) -> Result<(String, Vec<u8>), Failure> {
     let name = elf.display().to_string();
     let bytes = fs::read(elf).map_err(|error| {
         Failure::bad_input(format!("{name}: {}; name the firmware's ELF", output::describe(&error)))
     })?;
-    LogImage::parse(&name, &bytes)
+    Ok((name, bytes))
 }
 
 /// Hands the bytes of a log on, piece by piece, until its end or Ctrl-C.

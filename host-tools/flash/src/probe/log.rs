@@ -1,4 +1,4 @@
-//! What the firmware logs from its start on.
+//! What the firmware logs: from its start on, or from the moment on at which somebody begins to read.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -7,7 +7,8 @@ use bowden_core::outcome::Failure;
 use probe_rs::Core;
 use probe_rs::rtt::{Error, Rtt};
 
-use super::target::{Target, failure};
+use super::target::Target;
+use super::words;
 use crate::error::FlashError;
 
 /// How long a firmware that starts may be without a log.
@@ -21,11 +22,22 @@ const READ_BYTES: usize = 4096;
 
 impl Target {
     /// Hands the bytes of the first RTT channel on, whose control block is at `rtt`, until `stop` says so. A board that starts
-    /// again goes on.
+    /// again goes on. The processor is not halted, at the end neither.
     ///
     /// # Errors
-    /// [`FlashError::NoLog`], [`FlashError::Probe`]; what `take` says.
+    /// [`FlashError::NoLog`], [`FlashError::Unread`]; what `take` says.
     pub fn follow_log(
+        mut self,
+        rtt: u32,
+        stop: &dyn Fn() -> bool,
+        take: &mut dyn FnMut(&[u8]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let result = self.read_log(rtt, stop, take);
+        self.let_go();
+        result
+    }
+
+    fn read_log(
         &mut self,
         rtt: u32,
         stop: &dyn Fn() -> bool,
@@ -39,7 +51,7 @@ impl Target {
                 match channel.read(&mut core, &mut buffer) {
                     Ok(0) => sleep(LOOK),
                     Ok(length) => take(&buffer[..length])?,
-                    Err(Error::Probe(error)) => return Err(failure("reading the log", true, &error).into()),
+                    Err(Error::Probe(error)) => return Err(unread(&error).into()),
                     // The board started again.
                     Err(_) => break,
                 }
@@ -59,7 +71,7 @@ fn attach(core: &mut Core<'_>, rtt: u32, stop: &dyn Fn() -> bool) -> Result<Opti
                     return Ok(Some(channels));
                 }
             }
-            Err(Error::Probe(error)) => return Err(failure("reading the log", true, &error)),
+            Err(Error::Probe(error)) => return Err(unread(&error)),
             // The firmware has not written it yet.
             Err(_) => {}
         }
@@ -69,6 +81,10 @@ fn attach(core: &mut Core<'_>, rtt: u32, stop: &dyn Fn() -> bool) -> Result<Opti
         sleep(LOOK);
     }
     Ok(None)
+}
+
+fn unread(error: &dyn std::error::Error) -> FlashError {
+    FlashError::Unread { during: "reading the log".to_owned(), reason: words(error) }
 }
 
 fn no_log() -> FlashError {

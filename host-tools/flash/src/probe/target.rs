@@ -36,6 +36,13 @@ const UNPROTECTED: u32 = 0xaa;
 /// Option bit of a flash of two banks.
 const TWO_BANKS: u32 = 1 << 22;
 
+/// Debug Halting Control and Status Register, and the value that switches halting debug off (ARMv7-M, C1.6.2).
+const DHCSR: u64 = 0xe000_edf0;
+const NO_DEBUG: u32 = 0xa05f_0000;
+
+/// Debug Exception and Monitor Control Register, which catches resets and faults for a debugger.
+const DEMCR: u64 = 0xe000_edfc;
+
 /// How long a reset may take.
 const RESET_PATIENCE: Duration = Duration::from_millis(500);
 
@@ -48,7 +55,8 @@ pub struct Target {
 }
 
 impl Target {
-    /// Connects, and looks whether this is the board and whether its flash may be written. The processor runs on.
+    /// Connects, and looks whether this is the board and whether its flash may be written. The processor runs on; probe-rs halts it for a moment to
+    /// clear its breakpoints, which stops a joint that moves.
     ///
     /// # Errors
     /// [`FlashError::OtherChip`], [`FlashError::Protected`], [`FlashError::OneBank`]; [`FlashError::Probe`].
@@ -97,21 +105,59 @@ impl Target {
         core.reset_and_halt(RESET_PATIENCE)
             .map_err(|error| failure("resetting the processor", false, &error))?;
         progress.stage("verifying", image.bytes() as u64);
-        for run in image.runs() {
-            for (index, block) in run.bytes.chunks(BLOCK_BYTES).enumerate() {
-                let address = run.address + (index * BLOCK_BYTES) as u32;
-                let mut found = vec![0; block.len()];
-                core.read(address.into(), &mut found)
-                    .map_err(|error| failure(&format!("reading address {address:#010x}"), false, &error))?;
-                compare(address, block, &found)?;
-                progress.advance(block.len() as u64);
-            }
+        for (address, block) in blocks(image) {
+            let mut found = vec![0; block.len()];
+            core.read(address.into(), &mut found)
+                .map_err(|error| failure(&format!("reading address {address:#010x}"), false, &error))?;
+            compare(address, block, &found)?;
+            progress.advance(block.len() as u64);
         }
         let starting = |error| failure("starting the image, which is written", false, &error);
         if let Some(rtt) = image.rtt().filter(|_| log) {
             core.write_32(rtt.into(), &[0; 4]).map_err(starting)?;
         }
         core.run().map_err(starting)
+    }
+
+    /// Compares the flash with an image, while the processor runs. A target that holds another one is let go as it runs.
+    ///
+    /// # Errors
+    /// [`FlashError::OtherImage`]; [`FlashError::Unread`].
+    pub fn holding(mut self, image: &Image) -> Result<Self, FlashError> {
+        match self.compare(image) {
+            Ok(()) => Ok(self),
+            Err(error) => {
+                self.let_go();
+                Err(error)
+            }
+        }
+    }
+
+    fn compare(&mut self, image: &Image) -> Result<(), FlashError> {
+        let mut core = self.core(true)?;
+        for (address, block) in blocks(image) {
+            let mut found = vec![0; block.len()];
+            core.read(address.into(), &mut found).map_err(|error| FlashError::Unread {
+                during: format!("reading address {address:#010x}"),
+                reason: words(&error),
+            })?;
+            compare(address, block, &found).map_err(|error| match error {
+                FlashError::Differs { address, found, expected } => {
+                    FlashError::OtherImage { address, found, expected }
+                }
+                other => other,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Ends the debugging of a processor that runs, without the end of the session of probe-rs, which halts it for a moment: that stops a joint.
+    pub(super) fn let_go(mut self) {
+        if let Ok(mut core) = self.core(true) {
+            // A board that is gone has nothing to be switched off.
+            let _ = core.write_word_32(DEMCR, 0).and_then(|()| core.write_word_32(DHCSR, NO_DEBUG));
+        }
+        std::mem::forget(self.session);
     }
 
     /// The one core.
@@ -125,7 +171,15 @@ impl Target {
     }
 }
 
-pub(super) fn failure(during: &str, whole: bool, error: &dyn std::error::Error) -> FlashError {
+/// An image in pieces of [`BLOCK_BYTES`], with their addresses.
+fn blocks(image: &Image) -> impl Iterator<Item = (u32, &[u8])> {
+    image.runs().iter().flat_map(|run| {
+        let blocks = run.bytes.chunks(BLOCK_BYTES).enumerate();
+        blocks.map(|(index, block)| (run.address + (index * BLOCK_BYTES) as u32, block))
+    })
+}
+
+fn failure(during: &str, whole: bool, error: &dyn std::error::Error) -> FlashError {
     FlashError::Probe { during: during.to_owned(), reason: words(error), whole }
 }
 

@@ -31,6 +31,10 @@ pub struct Chip {
     /// R0 to R15, xPSR, and whatever else the selector of registers reaches.
     pub registers: [u32; 128],
     pub halted: bool,
+    /// How often a debugger has halted it, or let it step.
+    pub halts: usize,
+    /// How often it was reset.
+    pub resets: usize,
     dhcsr: u32,
     dcrdr: u32,
     demcr: u32,
@@ -56,6 +60,8 @@ impl Chip {
             started_at: None,
             registers,
             halted: false,
+            halts: 0,
+            resets: 0,
             dhcsr: 0,
             dcrdr: 0,
             demcr: 0,
@@ -148,6 +154,7 @@ impl Chip {
         if value & 1 == 0 || value & HALT != 0 {
             // Without debugging it runs; one that is to halt halts.
             self.halted = value & 1 != 0;
+            self.halts += usize::from(self.halted);
             self.dfsr |= u32::from(self.halted);
             return;
         }
@@ -184,6 +191,7 @@ impl Chip {
     fn reset(&mut self) {
         self.flash.reset();
         self.started_at = None;
+        self.resets += 1;
         self.was_reset = true;
         let (stack, entry) = (self.flash.word(0), self.flash.word(4));
         (self.registers[13], self.registers[17]) = (stack, stack);
@@ -203,8 +211,13 @@ impl Chip {
         self.log_in = START_READS;
     }
 
+    /// Whether a debugger may halt it.
+    pub fn is_debugged(&self) -> bool {
+        self.dhcsr & 1 != 0
+    }
+
     /// It writes its control block, and logs.
-    fn begin_log(&mut self) {
+    pub fn begin_log(&mut self) {
         let Some((block, log)) = &self.log else { return };
         let place = (*block - RAM) as usize;
         let (buffer, size) = (*block + 0x100, 1024_u32);
