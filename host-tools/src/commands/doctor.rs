@@ -7,11 +7,9 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_host_link::serial::{USB_PRODUCT, USB_VENDOR, udev_rule};
 use serde::Serialize;
 
+use super::port::timeout;
 use super::{print, print_json};
 use crate::machine::{Device, Machine, PROBE_VENDOR, at_least, version_of};
-
-/// Time that a board gets for an answer, s.
-const TIMEOUT_S: f64 = 1.5;
 
 /// Compiler that the sources need.
 const RUST_VERSION: &str = env!("CARGO_PKG_RUST_VERSION");
@@ -25,6 +23,9 @@ pub struct DoctorArguments {
     /// Board to talk to as well: a serial port, `auto`, or `sim`
     #[arg(long, value_name = "PATH|auto|sim")]
     port: Option<String>,
+    /// How long an answer of the board is waited for, s
+    #[arg(long, value_name = "SECONDS", default_value = "1.5", value_parser = timeout)]
+    timeout: Duration,
     /// Print JSON: one array, one object a check
     #[arg(long)]
     json: bool,
@@ -74,7 +75,7 @@ impl DoctorArguments {
             port(&machine.boards(USB_VENDOR, USB_PRODUCT)),
         ];
         if let Some(port) = &self.port {
-            checks.push(board(port));
+            checks.push(board(port, self.timeout));
         }
         if self.json {
             print_json(&checks)?;
@@ -167,8 +168,8 @@ fn port(boards: &[Device]) -> Check {
     Check::new("port", Grade::Ok, format!("{}, serial number {}", names.join(", "), first.serial), "")
 }
 
-fn board(port: &str) -> Check {
-    let mut client = match bowden_host_link::connect(port, Duration::from_secs_f64(TIMEOUT_S)) {
+fn board(port: &str, timeout: Duration) -> Check {
+    let mut client = match bowden_host_link::connect(port, timeout) {
         Ok(client) => client,
         Err(error) => return Check::new("board", Grade::Wrong, error.to_string(), ""),
     };

@@ -57,7 +57,11 @@ impl PortArguments {
     }
 }
 
-fn timeout(text: &str) -> Result<Duration, String> {
+/// Reads how long an answer is waited for, s, from an argument.
+///
+/// # Errors
+/// Says what is allowed.
+pub fn timeout(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.05..=600.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
         _ => Err("allowed 0.05 to 600 s".to_owned()),

@@ -78,6 +78,39 @@ fn a_board_of_another_version_is_not_talked_to() {
     assert!(terminal.fake().carried_out.iter().all(|message| *message == ToBoard::Hello));
 }
 
+/// Grade, finding and advice of `bowden doctor` about a board, and whether the board is why the exit status is 1.
+fn doctor(mishaps: Mishaps) -> [String; 3] {
+    let terminal = Terminal::new(Fake::new(mishaps));
+    let folder = tempfile::tempdir().unwrap();
+    let (status, stdout, stderr) = terminal.bowden(folder.path(), "doctor", &["--json"]);
+    let checks: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    let checks = checks.as_array().unwrap();
+    let wrong = |check: &&serde_json::Value| check["grade"] == "wrong";
+    assert_eq!(status, i32::from(checks.iter().any(|check| wrong(&check))), "{stderr}");
+    let board = checks.iter().find(|check| check["subject"] == "board").unwrap();
+    if wrong(&board) {
+        assert!(stderr.contains("board"), "{stderr}");
+    }
+    ["grade", "found", "next"].map(|key| board[key].as_str().unwrap().replace(terminal.port(), "PORT"))
+}
+
+#[test]
+fn doctor_says_whether_firmware_and_program_fit() {
+    let [grade, found, next] = doctor(Mishaps::default());
+    let expected = format!(
+        "fake, firmware 9.8.7 0123456789ab, this program {}: they speak the same protocol",
+        env!("CARGO_PKG_VERSION")
+    );
+    assert_eq!((grade.as_str(), found), ("hint", expected));
+    assert_eq!(next, "flash the firmware of this version to have what its change log says");
+    // Another protocol, and another layout of its messages under the same number.
+    let [grade, found, _] = doctor(Mishaps { protocol_version: Some(7), ..Mishaps::default() });
+    let expected = "PORT: firmware 9.8.7 speaks protocol version 7, expected 2; use the bowden that belongs to this firmware";
+    assert_eq!((grade.as_str(), found.as_str()), ("wrong", expected));
+    let [grade, found, _] = doctor(Mishaps { schema: Some([7; 8]), ..Mishaps::default() });
+    assert!(grade == "wrong" && found.starts_with("PORT: firmware 9.8.7 "), "{grade} {found}");
+}
+
 #[test]
 fn what_cannot_be_done_is_told_before_the_port_is_opened() {
     let record = |arguments: &[&'static str]| -> Vec<&'static str> {
