@@ -10,6 +10,7 @@ use bowden_core::recording::{Format, ReadOptions, Recording, SAVE_INTERVAL};
 use crate::fake::Fake;
 use crate::mishaps::Mishaps;
 use crate::pseudo_terminal::Terminal;
+use crate::screen::Screen;
 use crate::{bowden, command, result_of};
 
 /// Longest wait for what has to come soon.
@@ -91,18 +92,16 @@ fn what_a_board_has_sent_is_on_the_medium_soon_also_if_it_sends_no_more() {
     drop(fake);
 }
 
-/// A file that may not grow beyond a limit is what a full disk is: the write that does not fit fails.
-fn limited(folder: &Path, blocks: u32, out: &str) -> (i32, String, String) {
+/// `bowden` where no file may grow beyond a limit, as on a full disk: the write that does not fit fails.
+fn limited(folder: &Path, blocks: u32, arguments: &[&str]) -> Command {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
-    let run = [&RUN[..], &["--seconds", "6", "--quiet", "--out", out]].concat();
-    let output = Command::new("sh")
+    let mut command = Command::new("sh");
+    command
         .current_dir(folder)
-        .args(["-c", &script, "sh", env!("CARGO_BIN_EXE_bowden")])
-        .args(run)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    result_of(&output)
+        .args(["-c", &script, "sh", env!("CARGO_BIN_EXE_bowden"), "--quiet"])
+        .args(arguments)
+        .stdin(Stdio::null());
+    command
 }
 
 #[test]
@@ -110,7 +109,8 @@ fn a_full_disk_keeps_what_found_room_and_says_so_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path();
     for (out, blocks) in [("a.mcap", 1000), ("b.csv", 4000), ("c.csv.gz", 1000)] {
-        let (status, stdout, stderr) = limited(place, blocks, out);
+        let run = [&RUN[..], &["--seconds", "6", "--out", out]].concat();
+        let (status, stdout, stderr) = result_of(&limited(place, blocks, &run).output().unwrap());
         assert_eq!((status, stdout.as_str()), (1, ""), "{stderr}");
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
         let recording = load(&place.join(out));
@@ -126,6 +126,47 @@ fn a_full_disk_keeps_what_found_room_and_says_so_in_one_line() {
     let (status, _, stderr) = bowden(place, &run);
     assert_eq!((status, stderr.lines().count()), (1, 1), "{stderr}");
     assert!(stderr.contains("no space left on device; 0 rows"), "{stderr}");
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_of_a_monitor_and_not_the_view() {
+    let folder = tempfile::tempdir().unwrap();
+    let command = limited(folder.path(), 2000, &["monitor", "--port", "sim", "--record", "a.csv"]);
+    let mut screen = Screen::start(&command, 100, 30);
+    screen.wait_for("a.csv: NOT RECORDED ANY MORE");
+    screen.press("a");
+    screen.wait_for("ARMED");
+    screen.press("q");
+    let (status, stderr) = screen.end();
+    let rows = load(&folder.path().join("a.csv")).len();
+    assert!(rows > 1000, "{rows} rows");
+    let expected = format!("bowden: a.csv: cannot be written: file too large; {rows} rows over ");
+    assert!(stderr.starts_with(&expected) && stderr.lines().count() == 1, "{expected}: {stderr}");
+    assert!(stderr.trim_end().ends_with("are kept; make room and record again"), "{stderr}");
+    assert_eq!(status, 1);
+}
+
+#[test]
+fn a_full_disk_stops_a_plan_which_goes_on_when_there_is_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    let follow =
+        |seconds: f64| format!("[[step]]\nkind = \"follow\"\nreference = \"hold\"\nseconds = {seconds:?}\n");
+    let plan = ["schema = \"bowden-plan/1\"\n".to_owned(), follow(0.1), follow(2.0)].concat();
+    fs::write(place.join("plan.toml"), plan).unwrap();
+    let run = ["run", "plan.toml", "--port", "sim", "--out", "out", "--format", "csv"];
+    let (status, stdout, stderr) = result_of(&limited(place, 2000, &run).output().unwrap());
+    assert_eq!((status, stdout.as_str(), stderr.lines().count()), (1, "", 1), "{stderr}");
+    let rows = load(&place.join("out/02-hold.csv")).len();
+    assert!(rows > 1000 && rows < 20_000, "{rows} rows");
+    let expected = format!("bowden: out/02-hold.csv: cannot be written: file too large; {rows} rows over ");
+    assert!(stderr.starts_with(&expected), "{expected}: {stderr}");
+    assert!(stderr.ends_with("1 of 2 steps are done; the same command goes on with 02-hold\n"), "{stderr}");
+    let (status, stdout, stderr) = bowden(place, &run);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    assert!(stdout.starts_with("unnamed: 2 steps done, 1 of them before this start\n"), "{stdout}");
+    let [whole, kept] = ["out/02-hold.csv", "out/02-hold.stopped-1.csv"].map(|name| load(&place.join(name)));
+    assert_eq!((whole.len(), kept.len()), (20_000, rows));
 }
 
 #[test]

@@ -84,6 +84,8 @@ pub struct Fake {
     pub stored: usize,
     pub state: State,
     pub tick: u32,
+    /// What the sensors show at every tick; none: [`signals`].
+    pub shown: Option<Sample>,
     fault: Option<FaultRecord>,
     values: Vec<f32>,
     until: u64,
@@ -133,6 +135,7 @@ impl Fake {
             state: State::Off,
             // The board has been on for a while, and its count wraps soon.
             tick: 12_345,
+            shown: None,
             fault: None,
             values: PARAMETERS.iter().map(|parameter| parameter.4).collect(),
             until: 0,
@@ -209,7 +212,7 @@ impl Fake {
         if self.state.drives() && silent_s > limit_s {
             self.trip(Fault::HostSilent, 0, silent_s, limit_s);
         }
-        let sample = Sample { state: self.state, ..signals(self.tick) };
+        let sample = Sample { state: self.state, ..self.shown.unwrap_or_else(|| signals(self.tick)) };
         if self.state != State::Fault {
             self.snapshot.push_back((self.tick, sample));
             if self.snapshot.len() > 64 {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bowden_core::recording::{Column, ReadOptions, Recording};
 use bowden_link::message::{Goal, Mode};
-use bowden_link::{State, ToBoard};
+use bowden_link::{Limit, Limits, Sample, State, ToBoard};
 use vt100::Color;
 
 use crate::fake::Fake;
@@ -75,6 +75,83 @@ fn a_joint_is_armed_homed_and_run_by_keys_while_every_tick_is_recorded() {
     assert!(ran >= 3000, "{ran}");
     let fake = terminal.fake();
     assert_eq!((fake.state, fake.violations.as_slice()), (State::Off, [].as_slice()));
+}
+
+/// Values of one sample, whose SI values and axes are computed by hand from the codes and the parameters of the fake.
+///
+/// | signal | codes | value |
+/// |---|---|---|
+/// | pulley | 512 counts of 4096 from its zero | pi/4 = 0.7854 rad |
+/// | joint | -256 counts from its zero, turning the other way | pi/8 = 0.3927 rad |
+/// | reference, error | 2^19 steps of 2^-20 rad | 0.5 rad, 0.5 - 0.3927 = 0.1073 rad |
+/// | f1 | (2048 - 620.5) 0.035037 N | 50.0153 N |
+/// | f2 | (1600 - 600) 0.03 N | 30.0000 N |
+/// | f3 | (1191 - 620.5) 0.035037 N | 19.9886 N |
+/// | f4 | (1000 - 620.5) 0.035037 N | 13.2965 N |
+/// | torque in, out | (f1 - f3) 0.015 m, (f2 - f4) 0.015 m | 0.4504 N·m, 0.2506 N·m |
+/// | duty | -8192 of 32767 | -0.250 |
+/// | current | (2200 - 2047.5) 0.0067155 A | 1.024 A |
+#[test]
+fn angles_torques_duty_current_error_and_limits_stand_on_the_screen() {
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    terminal.fake().shown = Some(Sample {
+        encoder_count_raw: [1512, 1744],
+        tension_raw: [2048, 1600, 1191, 1000],
+        current_raw: 2200,
+        bus_raw: 2707,
+        duty_raw: -8192,
+        reference_raw: 1 << 19,
+        command_raw: 0,
+        state: State::Off,
+        limits: Limits(Limit::Current as u16 | Limit::OutputTorque as u16),
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let show = |mode: &str, expected: &[&str]| {
+        let command = terminal.command(folder.path(), "monitor", &["--no-color", "--mode", mode]);
+        // Wide enough for all panels.
+        let mut screen = Screen::start(&command, 160, 40);
+        screen.wait_for("limits: current limited, output torque at its limit");
+        screen.wait_until("all values", |text| expected.iter().all(|part| text.contains(part)));
+        screen.press("q");
+        assert_eq!(screen.end(), (0, String::new()));
+    };
+    let common = [
+        "f1 50.02  f2 30.00  f3 19.99  f4 13.30 N  torque in +0.4504 out +0.2506 N·m",
+        "duty -0.250  current +1.024 A  bus 24.00 V",
+        // Middle of the curves and 1.05 of half of their range, or of the smallest range: tensions, duty, current.
+        "+50.9",
+        "+12.4",
+        "-0.198",
+        "-0.303",
+        "+1.129",
+        "+0.919",
+    ];
+    // Angles 0.3927 to 0.7854, torques 0.2506 to 0.4504, error 0.1073.
+    let position = [
+        "joint +0.3927 rad  pulley +0.7854 rad  reference +0.5000 rad  error +0.1073 rad",
+        "angles [rad] r=reference p=pulley j=joint",
+        "+0.795",
+        "+0.383",
+        "torque [N·m] i=in o=out",
+        "+0.455",
+        "+0.246",
+        "error [rad]",
+        "+0.118",
+        "+0.097",
+    ];
+    show("position", &[&common[..], &position].concat());
+    // The same sample: 0.5 N·m are wanted, torques 0.2506 to 0.5, error 0.5 - 0.2506.
+    let torque = [
+        "joint +0.3927 rad  pulley +0.7854 rad  reference +0.5000 N·m  error +0.2494 N·m",
+        "angles [rad] p=pulley j=joint",
+        "torque [N·m] r=reference i=in o=out",
+        "+0.506",
+        "+0.244",
+        "error [N·m]",
+        "+0.260",
+        "+0.239",
+    ];
+    show("torque", &[&common[..], &torque].concat());
 }
 
 #[test]
