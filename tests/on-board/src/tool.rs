@@ -2,7 +2,7 @@
 
 use std::env;
 use std::io::{Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
@@ -67,9 +67,14 @@ impl Plugged {
         Ok(Self { board, terminal })
     }
 
+    /// Name of the port.
+    pub fn port(&self) -> String {
+        self.terminal.path().to_string_lossy().into_owned()
+    }
+
     /// Arguments of `bowden` that begin a command with this board: `<command> --port <terminal> --timeout 600`.
     pub fn arguments(&self, command: &str) -> [String; 5] {
-        let port = self.terminal.path().to_string_lossy().into_owned();
+        let port = self.port();
         [command.to_owned(), "--port".to_owned(), port, "--timeout".to_owned(), ANSWER_LIMIT_S.to_owned()]
     }
 
@@ -87,21 +92,42 @@ impl Plugged {
     ) -> Outcome<Ran> {
         let before = self.arguments(command);
         let line: Vec<&str> = before.iter().map(String::as_str).chain(arguments.iter().copied()).collect();
-        self.run_whole(&line, act)
+        self.run_whole(None, &line, act)
+    }
+
+    /// Runs `bowden <line>`, which names the port itself, in `folder` while the board runs.
+    pub fn run_in(&mut self, folder: &Path, line: &[&str]) -> Outcome<Ran> {
+        self.run_in_beside(folder, line, |_| ())
+    }
+
+    /// The same, with what `act` does to the board each time before it goes on.
+    pub fn run_in_beside(
+        &mut self,
+        folder: &Path,
+        line: &[&str],
+        act: impl FnMut(&mut Board),
+    ) -> Outcome<Ran> {
+        self.run_whole(Some(folder), line, act)
     }
 
     /// Runs `bowden <line> --port <terminal>` while the board runs, with what `act` does to the board each time before it goes on.
     pub fn run_line(&mut self, line: &[&str], act: impl FnMut(&mut Board)) -> Outcome<Ran> {
-        let port = self.terminal.path().to_string_lossy().into_owned();
-        self.run_whole(&[line, &["--port", &port]].concat(), act)
+        let port = self.port();
+        self.run_whole(None, &[line, &["--port", &port]].concat(), act)
     }
 
-    fn run_whole(&mut self, line: &[&str], act: impl FnMut(&mut Board)) -> Outcome<Ran> {
+    fn run_whole(
+        &mut self,
+        folder: Option<&Path>,
+        line: &[&str],
+        act: impl FnMut(&mut Board),
+    ) -> Outcome<Ran> {
         let path = tool()?;
         let what = format!("{} {}", path.display(), line.join(" "));
         let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
         let child = Command::new(&path)
             .args(line)
+            .current_dir(folder.unwrap_or(Path::new(".")))
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -14,6 +14,7 @@ mod determinism;
 mod directions;
 mod failures;
 mod faults;
+mod first_hour;
 mod flash;
 mod flash_over_usb;
 mod load;
@@ -25,6 +26,7 @@ mod moved_sheath;
 mod parameters;
 mod replay_control;
 mod ripple_table;
+mod run;
 #[path = "../../../../host-tools/tests/common/screen.rs"]
 #[expect(dead_code, reason = "another part of it is for the tests of the host tools")]
 mod screen;
