@@ -1,16 +1,48 @@
 """Simulation, replay, fit and diagnosis from Python, against the command and against each other."""
 
+import ast
+import itertools
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import threading
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tqdm import TqdmWarning
 
 import bowden
+
+PAGE = Path(__file__).resolve().parents[2] / "docs/python.md"
+
+
+def test_the_first_example_of_the_page_gives_what_its_comments_say(play, tmp_path, monkeypatch):
+    example = re.search(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[1]
+    for name, here in (("train.csv", "train.csv"), ("rig.toml", "rig.toml"), ("heldout.csv", "other.csv")):
+        shutil.copy(play / name, tmp_path / here)
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    values, comments = [], []
+    with warnings.catch_warnings():
+        # Outside a notebook tqdm.auto takes the bar for terminals and says that ipywidgets could be there.
+        warnings.simplefilter("ignore", TqdmWarning)
+        for statement in ast.parse(example).body:
+            if isinstance(statement, ast.Expr):
+                values.append(eval(compile(ast.Expression(statement.value), str(PAGE), "eval"), names))
+                comments.append(example.splitlines()[statement.lineno - 1].partition("# ")[2])
+            else:
+                exec(compile(ast.Module([statement], []), str(PAGE), "exec"), names)
+    verdict, (effect, probability), gap, report, angle, picture = values
+    said, (said_effect, said_probability) = (ast.literal_eval(comment) for comment in comments[:2])
+    assert (verdict, effect) == (said, said_effect) and probability == pytest.approx(said_probability, abs=5e-4)
+    assert isinstance(gap, bowden.Estimate) and f'unit="{gap.unit}"' in comments[2] and gap.value > 0.0
+    assert report.read_text().startswith("<!DOCTYPE html>") and picture.axes
+    assert angle.shape == (len(bowden.Recording.load("other.csv")),)
 
 
 def test_python_and_shell_get_the_same_diagnosis(play, play_diagnosis, bowden_command, tmp_path):
