@@ -1,5 +1,6 @@
 //! Diagnoses.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use bowden_core::diagnose::verdict::Trace;
@@ -55,6 +56,13 @@ impl NativeDiagnosis {
 
     fn report_html(&self) -> String {
         render(&self.diagnosed.findings)
+    }
+
+    /// Writes the report.
+    fn report(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        output::check_file(&path, &[]).or_raise(py)?;
+        let html = render(&self.diagnosed.findings);
+        output::write_file(&path, |file| file.write_all(html.as_bytes())).or_raise(py)
     }
 
     /// Name and diagnosed rig of every bench.

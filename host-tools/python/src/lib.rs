@@ -24,7 +24,7 @@ mod _bowden {
     #[pymodule_export]
     use crate::hypothesis::NativeHypothesis;
     #[pymodule_export]
-    use crate::neighbours::{mujoco_model, rig_of_model};
+    use crate::neighbours::{export_mujoco, rig_of_model};
     #[pymodule_export]
     use crate::recording::{NativeRecording, channels};
     #[pymodule_export]

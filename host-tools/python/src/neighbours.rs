@@ -1,8 +1,10 @@
 //! Rigs from other simulators' models, and what was found back to them.
 
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use bowden_core::neighbours::{Mapped, from_mjcf, from_urdf, into_mjcf, to_mjcf};
+use bowden_core::output;
 use pyo3::prelude::*;
 
 use crate::errors::Raise;
@@ -26,22 +28,28 @@ pub fn rig_of_model(
     Ok((NativeRig::new(py, document)?, imported.zero_rad, statements(&imported.mapped)))
 }
 
-/// Text of a MuJoCo model of a rig, or of one that is there with the rig's values at a joint; and every statement.
+/// Writes a MuJoCo model of a rig, or one that is there with the rig's values at a joint; returns every statement. Refuses to overwrite one of
+/// the files `read`.
 #[pyfunction]
-#[pyo3(signature = (rig, into=None, joint=None))]
-pub fn mujoco_model(
+#[pyo3(signature = (rig, path, into, joint, read))]
+pub fn export_mujoco(
     py: Python<'_>,
     rig: &Bound<'_, NativeRig>,
+    path: PathBuf,
     into: Option<PathBuf>,
     joint: Option<&str>,
-) -> PyResult<(String, Vec<Statement>)> {
+    read: Vec<PathBuf>,
+) -> PyResult<Vec<Statement>> {
+    let inputs: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
+    output::check_file(&path, &inputs).or_raise(py)?;
     let rig = rig.get().rig();
     let (text, mapped) = match (into, joint) {
         (Some(into), Some(joint)) => into_mjcf(rig, &into, joint).or_raise(py)?,
         (None, None) => to_mjcf(rig).or_raise(py)?,
         _ => return Err("into and joint belong together; give both or none".to_owned()).or_raise(py),
     };
-    Ok((text, statements(&mapped)))
+    output::write_file(&path, |file| file.write_all(text.as_bytes())).or_raise(py)?;
+    Ok(statements(&mapped))
 }
 
 fn statements(mapped: &[Mapped]) -> Vec<Statement> {

@@ -141,6 +141,22 @@ def test_a_diagnosed_joint_goes_into_a_model_that_somebody_else_wrote(rig, tmp_p
     assert not (tmp_path / "none.xml").exists()
 
 
+def test_a_model_is_not_written_over_a_file_that_was_read_nor_into_a_folder_that_is_not_there(rig, tmp_path):
+    model, rig_file, missing = tmp_path / "arm.xml", tmp_path / "rig.toml", tmp_path / "none/arm.xml"
+    model.write_bytes((MODELS / "arm26.xml").read_bytes())
+    rig.save(rig_file)
+    for path, options in ((model, {"into": model, "joint": "elbow"}), (tmp_path / "../" / tmp_path.name / "arm.xml", {"into": model, "joint": "elbow"})):
+        with pytest.raises(bowden.InputError, match="would overwrite the input .*; name another output"):
+            bowden.export_mujoco(rig, path, **options)
+    with pytest.raises(bowden.InputError, match="rig.toml: would overwrite the input"):
+        bowden.export_mujoco(rig_file, rig_file)
+    with pytest.raises(bowden.InputError) as raised:
+        bowden.export_mujoco(rig, missing)
+    assert str(raised.value) == f"{missing}: folder {missing.parent} does not exist; create it first"
+    assert model.read_bytes() == (MODELS / "arm26.xml").read_bytes() and bowden.Rig.load(rig_file) == rig
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.xml", "rig.toml"]
+
+
 JOINT_STATE = """std_msgs/Header header
 string[] name
 float64[] position

@@ -63,6 +63,17 @@ def test_python_and_shell_get_the_same_diagnosis(play, play_diagnosis, bowden_co
     assert d.report(tmp_path / "again.html").read_bytes() == (tmp_path / "shell/report.html").read_bytes()
 
 
+def test_a_report_that_cannot_be_written_is_refused_in_one_line_and_leaves_nothing(play_diagnosis, tmp_path):
+    missing = tmp_path / "none/report.html"
+    with pytest.raises(bowden.InputError) as raised:
+        play_diagnosis.report(missing)
+    assert str(raised.value) == f"{missing}: folder {missing.parent} does not exist; create it first"
+    assert (raised.value.file, raised.value.hint) == (str(missing), "create it first")
+    with pytest.raises(bowden.InputError, match="is a folder, expected a file name"):
+        play_diagnosis.report(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_play_is_found_and_the_diagnosed_rig_replays_a_recording_better(play, play_diagnosis):
     d = play_diagnosis
     assert [effect.id for effect in d.effects] == ["joint_backlash"]

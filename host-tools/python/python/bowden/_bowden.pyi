@@ -17,8 +17,8 @@ __all__ = [
     "NativeStudy",
     "channels",
     "diagnose",
+    "export_mujoco",
     "fit",
-    "mujoco_model",
     "replay",
     "rig_of_model",
     "simulate",
@@ -98,6 +98,7 @@ class NativeDiagnosis:
         self,
     ) -> list[tuple[str, str, _Floats, _Floats, _Floats, _Floats, NDArray[np.bool_]]]: ...
     def report_html(self) -> str: ...
+    def report(self, path: _Path) -> None: ...
     def rigs(self) -> list[tuple[str, NativeRig]]: ...
     def save(self, folder: _Path) -> Path: ...
 
@@ -133,9 +134,9 @@ def diagnose(
 def fit(
     study: NativeStudy, watcher: _Watcher | None = None, jobs: int | None = None
 ) -> tuple[str, list[NativeRig]]: ...
-def mujoco_model(
-    rig: NativeRig, into: _Path | None = None, joint: str | None = None
-) -> tuple[str, list[tuple[int | None, str, str, bool]]]: ...
+def export_mujoco(
+    rig: NativeRig, path: _Path, into: _Path | None, joint: str | None, read: Sequence[_Path]
+) -> list[tuple[int | None, str, str, bool]]: ...
 def rig_of_model(
     kind: str, path: _Path, joint: str, base: NativeRig
 ) -> tuple[NativeRig, float, list[tuple[int | None, str, str, bool]]]: ...

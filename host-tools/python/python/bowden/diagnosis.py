@@ -152,15 +152,13 @@ class Diagnosis:
         return self._native.json
 
     def report(self, path: str | os.PathLike[str]) -> pathlib.Path:
-        """Writes the report, one self-contained HTML file; it appears under its name only when it is complete."""
-        target = pathlib.Path(path)
-        partial = target.with_name(f".bowden-{os.getpid()}-{target.name}.partial")
-        try:
-            partial.write_text(self._native.report_html(), encoding="utf-8")
-            partial.replace(target)
-        finally:
-            partial.unlink(missing_ok=True)
-        return target
+        """Writes the report, one self-contained HTML file; it appears under its name only when it is complete.
+
+        Raises:
+            InputError: The folder of `path` does not exist.
+        """
+        self._native.report(path)
+        return pathlib.Path(path)
 
     def save(self, folder: str | os.PathLike[str]) -> pathlib.Path:
         """Writes `diagnosis.json`, `report.html`, the diagnosed rigs and references of experiments worth doing; returns the report."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pathlib
 from dataclasses import dataclass
 
 from bowden import _bowden
@@ -69,16 +68,12 @@ def export_mujoco(rig: RigLike, path: _Path, *, into: _Path | None = None, joint
         path: The model to write; it appears under its name only when it is complete.
         into: Model that gets the joint's values; it is not changed itself.
         joint: Which joint of it.
+
+    Raises:
+        InputError: No such joint; or `path` is in a folder that does not exist, or is `into` or the file of `rig`.
     """
-    text, mapped = _bowden.mujoco_model(as_rig(rig)._native, into, joint)
-    target = pathlib.Path(path)
-    partial = target.with_name(f".bowden-{os.getpid()}-{target.name}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(target)
-    finally:
-        partial.unlink(missing_ok=True)
-    return _mapped(mapped)
+    read = [file for file in (into, None if isinstance(rig, Rig) else rig) if file is not None]
+    return _mapped(_bowden.export_mujoco(as_rig(rig)._native, path, into, joint, read))
 
 
 def _imported(kind: str, path: _Path, joint: str, base: RigLike) -> Imported:
