@@ -81,11 +81,32 @@ pub fn environment(interpreter: &Path, folder: &Path, name: &str, packages: &str
     Ok(environment)
 }
 
+/// The one wheel among the files of a folder.
+///
+/// # Errors
+/// There is none or more than one, or it is not of the stable ABI and so fits the Python alone that built it.
+fn wheel_for_every_python(files: &[PathBuf]) -> Result<&Path, String> {
+    let wheels: Vec<&PathBuf> =
+        files.iter().filter(|path| path.extension().is_some_and(|e| e == "whl")).collect();
+    let [wheel] = wheels[..] else {
+        return Err(format!("{} wheels after the build, expected one", wheels.len()));
+    };
+    // NAME-VERSION-PYTHON-ABI-PLATFORM.whl
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
+    if name.rsplit('-').nth(1) == Some("abi3") {
+        Ok(wheel)
+    } else {
+        Err(format!(
+            "{name}: not built for the stable ABI (abi3); correct the features of {PACKAGE}/Cargo.toml"
+        ))
+    }
+}
+
 /// Builds the wheel and installs it. Tests take the profile of the other tests, `dev`: what `pip install` builds for users, `release`, is the
 /// same, optimised further.
 ///
 /// # Errors
-/// When it does not build, or cannot be installed.
+/// When it does not build, is not of the stable ABI, or cannot be installed.
 pub fn install_wheel(environment: &Path, folder: &Path, profile: &str) -> Result<(), String> {
     let wheels = folder.join("wheels");
     // Of an earlier version nothing may be left that could be installed instead.
@@ -96,9 +117,8 @@ pub fn install_wheel(environment: &Path, folder: &Path, profile: &str) -> Result
     maturin.arg("--interpreter").arg(program(environment, "python"));
     process::run(&mut maturin, &[0])?;
     let entries = fs::read_dir(&wheels).map_err(|error| format!("{}: {error}", wheels.display()))?;
-    let wheel =
-        entries.flatten().map(|entry| entry.path()).find(|path| path.extension().is_some_and(|e| e == "whl"));
-    let wheel = wheel.ok_or_else(|| format!("{}: no wheel after the build", wheels.display()))?;
+    let files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    let wheel = wheel_for_every_python(&files).map_err(|error| format!("{}: {error}", wheels.display()))?;
     println!("wheel: {}", wheel.display());
     let mut pip = pip(environment);
     pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(&wheel);
@@ -161,6 +181,24 @@ impl std::fmt::Display for Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wheel_of_one_python_alone_is_refused() {
+        let files = |names: &[&str]| -> Vec<PathBuf> {
+            names.iter().map(|name| Path::new("wheels").join(name)).collect()
+        };
+        let stable = files(&["bowden-0.1.0-cp311-abi3-manylinux_2_34_x86_64.whl", "notes.txt"]);
+        assert_eq!(wheel_for_every_python(&stable).unwrap(), stable[0]);
+        for (refused, why) in [
+            (&["bowden-0.1.0-cp311-cp311-manylinux_2_34_x86_64.whl"][..], "stable ABI"),
+            (&["abi3-0.1.0-cp311-cp311-linux_x86_64.whl"], "stable ABI"),
+            (&["notes.txt"], "0 wheels"),
+            (&["a-1-cp311-abi3-linux_x86_64.whl", "a-2-cp311-abi3-linux_x86_64.whl"], "2 wheels"),
+        ] {
+            let error = wheel_for_every_python(&files(refused)).unwrap_err();
+            assert!(error.contains(why), "{error}");
+        }
+    }
 
     #[test]
     fn counts_are_those_of_the_suite() {
