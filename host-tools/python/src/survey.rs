@@ -44,9 +44,11 @@ impl NativePlan {
         &self,
         py: Python<'_>,
         watcher: Option<&Bound<'_, PyAny>>,
-        jobs: usize,
+        jobs: Option<usize>,
     ) -> PyResult<(usize, usize, usize, Failures)> {
-        let work = |progress: &dyn Progress| survey::survey(&self.plan, &self.out, jobs, progress);
+        // As many as the command works with: the processors that this process may use.
+        let workers = jobs.unwrap_or_else(rayon::current_num_threads);
+        let work = |progress: &dyn Progress| survey::survey(&self.plan, &self.out, workers, progress);
         let (result, early) = run(py, watcher, None, work)?;
         if let Some(early) = early
             && !early.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py)

@@ -59,7 +59,8 @@ def survey(
         engine: `"local"`: the processors of this machine. `"ray"`: one recording a task on the Ray cluster that this process is connected
             to, or on a local one; the folders have to be seen by all its machines under the same path. Results are equal bit for bit.
         progress: Shows a bar on stderr; or a function, see `ProgressLike`.
-        jobs: Recordings at a time on this machine; as many as there are processors by default. Ray decides itself.
+        jobs: Recordings at a time on this machine; by default as many as there are processors that this process may
+            use. Ray decides itself.
 
     Raises:
         InputError: No folder, no recording, or none of them could be diagnosed.
@@ -75,7 +76,7 @@ def survey(
     else:
         rules = [("", rig)]
     plan = _bowden.NativePlan(folder, rules, out)
-    at_once = threads(jobs) or os.cpu_count() or 1
+    at_once = threads(jobs)
     with watching(progress) as watcher:
         if engine == "ray":
             from bowden.on_ray import survey_on_ray
