@@ -47,7 +47,7 @@ def test_layouts_and_dtypes_that_need_a_conversion_give_the_same_values(recordin
 
 
 def test_files_read_back_bit_for_bit_and_a_recording_can_be_pickled(recording, tmp_path):
-    for name in ("a.csv", "a.csv.gz", "a.mcap"):
+    for name in ("a.csv", "a.csv.gz", "a.mcap", "a.parquet"):
         recording.save(tmp_path / name)
         again = bowden.Recording.load(tmp_path / name)
         assert all(np.array_equal(again[role], recording[role]) for role in ("t_s", *recording.channels))

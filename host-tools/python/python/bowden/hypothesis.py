@@ -67,6 +67,9 @@ class Hypothesis:
     knots of a grid (1025 points, or 65 times 65 of two variables), and the simulation interpolates. A diagnosis makes some thousand such calls. The
     grid covers what the variables do in a replay of the rig as stated and half of that beyond; farther out the last value holds. A jump is a
     ramp of one knot's width: dry friction belongs to a friction port, which opposes motion by itself.
+
+    A hypothesis stays in memory until the process ends, and so does its function with all that this refers to; every diagnosis that tries
+    it keeps another copy of what is stated here.
     """
 
     def __init__(

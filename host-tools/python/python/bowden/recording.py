@@ -54,7 +54,7 @@ class Recording:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], rig: RigLike | None = None) -> Recording:
-        """Reads CSV, gzipped CSV or MCAP.
+        """Reads CSV, gzipped CSV, MCAP or Parquet; the content decides which.
 
         Args:
             path: The file.
@@ -91,7 +91,7 @@ class Recording:
         return cls.from_arrays({str(name): frame[name] for name in frame.columns}, rig, source)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes `.csv`, `.csv.gz` or `.mcap`; numbers read back bit for bit."""
+        """Writes `.csv`, `.csv.gz`, `.mcap` or `.parquet`; numbers read back bit for bit."""
         self._native.save(path)
 
     @property
