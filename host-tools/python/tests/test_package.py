@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bowden
@@ -42,8 +43,15 @@ def test_pictures_show_what_they_are_given(play, play_diagnosis):
     with pytest.raises(bowden.InputError, match="no trace of f9_n"):
         bowden.plots.overview(d, ["f9_n"])
     said = d.residual_map
+    drawn = bowden.plots.residual_map(d).axes
     # A colour bar is one more.
-    assert len(bowden.plots.residual_map(d).axes) == 2 * len(said.axes) + 1
+    assert len(drawn) == 2 * len(said.axes) + 1
+    channel = said.channels[-1]
+    largest = max(value for bins in channel.before_rmse for value in bins if value is not None)
+    filled = next(place for place, value in enumerate(channel.before_rmse[0]) if value is not None)
+    for axes, values in ((drawn[0], channel.before_rmse), (drawn[len(said.axes)], channel.after_rmse)):
+        cells = np.reshape(axes.collections[0].get_array(), (len(said.channels), -1))
+        assert cells[-1, filled] == pytest.approx(values[0][filled] / largest)
     bars = bowden.plots.before_after(d).axes[0].patches
     assert len(bars) == 3 * len(d.channels)
     first = next(iter(d.channels.values()))
@@ -51,8 +59,7 @@ def test_pictures_show_what_they_are_given(play, play_diagnosis):
     assert after == pytest.approx(first.after_rmse / first.before_rmse)
     loops = bowden.plots.hysteresis(play / "heldout.csv", d.rig, y="theta_out_rad", before=play / "rig.toml")
     assert [line.get_label() for line in loops.axes[0].lines] == ["rig as it was", "simulated", "measured"]
-    drawn = bowden.plots.law(play / "heldout.csv", d.rig, effect="joint_backlash", variable="theta_out_rad")
-    assert len(drawn.axes[0].lines) >= 2
+    _assert_points_on_line(bowden.plots.law(play / "heldout.csv", d.rig, effect="joint_backlash", variable="theta_out_rad"))
     for wrong in (
         lambda: bowden.plots.hysteresis(play / "heldout.csv", d.rig, y="duty"),
         lambda: bowden.plots.law(play / "heldout.csv", d.rig),
@@ -61,6 +68,28 @@ def test_pictures_show_what_they_are_given(play, play_diagnosis):
     ):
         with pytest.raises(bowden.InputError):
             wrong()
+
+
+def _assert_points_on_line(figure) -> np.ndarray:
+    """What is measured beyond the simulation lies where what the effect adds lies; returns the line, shape `(2, bins)`."""
+    points, line = (np.array(one.get_data()) for one in figure.axes[0].lines[:2])
+    assert np.array_equal(points[0], line[0]) and len(line[0]) >= 20
+    assert np.std(points[1] - line[1]) < 0.2 * np.std(line[1])
+    return line
+
+
+def test_a_law_is_drawn_against_what_was_measured(rig):
+    """The bench is simulated with a spring `-0.4 theta^3` that its rig file states by points."""
+    thetas = np.linspace(-0.8, 0.8, 81).tolist()
+    stated = '\n[[law]]\nname = "spring"\ncomponent = "joint"\nport = "joint_torque_nm"\nvariables = ["theta_out_rad"]\npoints = {}\n'
+    with_law, stronger = (bowden.Rig(rig.text + stated.format([[x, -k * x**3] for x in thetas])) for k in (0.4, 0.8))
+    recording = bowden.simulate(with_law, motion="sine", seconds=8.0, rate_hz=250.0, seed=3)
+    figure = bowden.plots.law(recording, with_law)
+    _assert_points_on_line(figure)
+    assert figure.axes[0].get_xlabel() == "theta_out_rad"
+    # A rig whose law is twice as strong draws a line beside the points.
+    with pytest.raises(AssertionError):
+        _assert_points_on_line(bowden.plots.law(recording, stronger))
 
 
 def test_without_matplotlib_pictures_say_what_to_install(play, monkeypatch):
