@@ -1,6 +1,8 @@
 """The notebooks run from top to bottom, find what they say, and show their pictures."""
 
+import base64
 import os
+import re
 from pathlib import Path
 
 import nbclient
@@ -8,6 +10,8 @@ import nbformat
 import pytest
 
 NOTEBOOKS = Path(__file__).resolve().parents[1] / "notebooks"
+DOCS = NOTEBOOKS.parents[1] / "docs"
+README = NOTEBOOKS.parents[2] / "README.md"
 
 
 def _run(name: str, folder: Path) -> nbformat.NotebookNode:
@@ -19,9 +23,9 @@ def _run(name: str, folder: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def _pictures(notebook: nbformat.NotebookNode) -> int:
+def _pictures(notebook: nbformat.NotebookNode) -> list[bytes]:
     outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
-    return sum("image/png" in output.get("data", {}) for output in outputs)
+    return [base64.b64decode(output.data["image/png"]) for output in outputs if "image/png" in output.get("data", {})]
 
 
 def _text(notebook: nbformat.NotebookNode) -> str:
@@ -43,18 +47,27 @@ def _assert_committed_as(executed: nbformat.NotebookNode, name: str) -> None:
 
 def test_the_servo_lacks_friction_that_grows_with_load(tmp_path):
     notebook = _run("servo.ipynb", tmp_path)
-    assert _pictures(notebook) == 5
+    assert len(_pictures(notebook)) == 5
     assert "gear_load_friction" in _text(notebook)
     _assert_committed_as(notebook, "servo.ipynb")
 
 
 def test_a_drag_that_no_catalogue_lists_becomes_its_formula(virtual_bench, tmp_path):
     notebook = _run("law.ipynb", tmp_path)
-    assert _pictures(notebook) == 3
+    assert len(_pictures(notebook)) == 3
     assert "joint_friction_nm = amplitude_nm * abs(omega_out_rad_s)^exponent" in _text(notebook)
+    # What the front page says of it, in two sentences and a comment.
+    losses = re.search(r"held-out loss from ([\d.]+) to ([\d.]+)", _verdict(notebook)).groups()
+    page = README.read_text()
+    assert re.findall(r"held-out loss from ([\d.]+) to ([\d.]+)", page) == [losses, losses]
+    assert f"('missing_physics', 'gear_load_friction', {losses[1]})" in page
     _assert_committed_as(notebook, "law.ipynb")
 
 
 @pytest.mark.parametrize("name", ["servo.ipynb", "law.ipynb"])
 def test_committed_notebooks_show_their_pictures(name):
-    assert _pictures(nbformat.read(NOTEBOOKS / name, as_version=4)) >= 3
+    assert len(_pictures(nbformat.read(NOTEBOOKS / name, as_version=4))) >= 3
+
+
+def test_the_picture_of_the_page_is_the_first_of_the_committed_notebook():
+    assert (DOCS / "python-law.png").read_bytes() == _pictures(nbformat.read(NOTEBOOKS / "law.ipynb", as_version=4))[0]
