@@ -40,9 +40,15 @@ def _verdict(notebook: nbformat.NotebookNode) -> str:
     return said[0].partition(" (normalised error")[0]
 
 
+def _heads(notebook: nbformat.NotebookNode) -> list[str]:
+    """Head lines of the tables of effects."""
+    return [line for line in _text(notebook).splitlines() if line.startswith("| effect |")]
+
+
 def _assert_committed_as(executed: nbformat.NotebookNode, name: str) -> None:
     """What readers see without executing it is what executing it gives; the executed one is in BOWDEN_NOTEBOOKS, to be committed."""
-    assert _verdict(nbformat.read(NOTEBOOKS / name, as_version=4)) == _verdict(executed)
+    committed = nbformat.read(NOTEBOOKS / name, as_version=4)
+    assert _verdict(committed) == _verdict(executed) and _heads(committed) == _heads(executed)
 
 
 def test_the_servo_lacks_friction_that_grows_with_load(tmp_path):
@@ -50,17 +56,17 @@ def test_the_servo_lacks_friction_that_grows_with_load(tmp_path):
     assert len(_pictures(notebook)) == 5
     assert "gear_load_friction" in _text(notebook)
     _assert_committed_as(notebook, "servo.ipynb")
+    # What the front page says of it, in two sentences and a comment.
+    losses = re.search(r"held-out loss from ([\d.]+) to ([\d.]+)", _verdict(notebook)).groups()
+    page = README.read_text()
+    assert re.findall(r"held-out loss from ([\d.]+) to ([\d.]+)", page) == [losses, losses]
+    assert f"('missing_physics', 'gear_load_friction', {losses[1]})" in page
 
 
 def test_a_drag_that_no_catalogue_lists_becomes_its_formula(virtual_bench, tmp_path):
     notebook = _run("law.ipynb", tmp_path)
     assert len(_pictures(notebook)) == 3
     assert "joint_friction_nm = amplitude_nm * abs(omega_out_rad_s)^exponent" in _text(notebook)
-    # What the front page says of it, in two sentences and a comment.
-    losses = re.search(r"held-out loss from ([\d.]+) to ([\d.]+)", _verdict(notebook)).groups()
-    page = README.read_text()
-    assert re.findall(r"held-out loss from ([\d.]+) to ([\d.]+)", page) == [losses, losses]
-    assert f"('missing_physics', 'gear_load_friction', {losses[1]})" in page
     _assert_committed_as(notebook, "law.ipynb")
 
 

@@ -71,7 +71,7 @@ class Diagnosis:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects that the diagnosis stands behind, most certain first."""
+        """Effects that the diagnosis reports, most certain first."""
         return read(tuple[Effect, ...], self._data["effects"])
 
     @cached_property
@@ -173,7 +173,7 @@ class Diagnosis:
     def _repr_markdown_(self) -> str:
         lines = [f"**{self.verdict}**: {self.summary}"]
         if self.effects:
-            lines += ["", "| effect | part | probability | parameters | off the held-out loss |", "|---|---|---|---|---|"]
+            lines += ["", "| effect | part | probability | parameters | reduction of held-out loss |", "|---|---|---|---|---|"]
         for effect in self.effects:
             parameters = ", ".join(f"{name} {estimate}" for name, estimate in effect.parameters.items())
             share = f"{effect.heldout_improvement:.0%}"

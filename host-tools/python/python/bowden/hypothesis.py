@@ -151,7 +151,7 @@ def _parameters(function: Callable[..., ArrayLike], name: str) -> list[str]:
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError) as error:
-        raise _refused(name, "the function does not tell its parameters", "wrap it in a function with named ones") from error
+        raise _refused(name, "the parameters of the function cannot be read", "wrap it in a function with named ones") from error
     if any(one.kind not in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY) for one in parameters):
         raise _refused(name, "the function takes parameters without a name", "name every parameter")
     return [one.name for one in parameters]

@@ -161,7 +161,7 @@ def law(
         effect: Which effect is left out; `"law"` is all laws.
         variable: `theta_in_rad`, `theta_out_rad`, `omega_in_rad_s`, `omega_out_rad_s`, `t_s` or a recorded channel; by default that of
             the rig's first law.
-        channel: Where it is looked at; by default the channel in which it takes away most.
+        channel: Where it is looked at; by default the one whose difference it reduces most.
     """
     believed = as_rig(rig)
     measured = as_recording(recording, believed)
@@ -233,7 +233,7 @@ def _label(name: str, unit: str) -> str:
 
 
 def _removed(measured: NDArray[np.float64], with_it: NDArray[np.float64], without_it: NDArray[np.float64]) -> float:
-    """Share of the variance of the differences that simulating it takes away."""
+    """Relative reduction of the variance of the differences by simulating it."""
     before = float(np.var(measured - without_it))
     return 1.0 - float(np.var(measured - with_it)) / before if before > 0.0 else 0.0
 

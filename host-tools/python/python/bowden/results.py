@@ -1,4 +1,4 @@
-"""What fits and diagnoses say, as typed values. Numbers are SI; the unit is in the name or stands beside."""
+"""What fits and diagnoses say, as typed values. Numbers are SI; the unit is in the name or in the field `unit`."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect that the diagnosis stands behind."""
+    """An effect that the diagnosis reports."""
 
     id: str
     component: str

@@ -23,7 +23,7 @@ class StudyRecording:
     bench: str
     """Name of its bench."""
     heldout: bool
-    """Whether it judges the result and takes no other part."""
+    """Whether it is held out: it evaluates the result and takes no part in fit and search."""
 
 
 class Study:
@@ -94,7 +94,7 @@ class Study:
         Args:
             recording: A recording, a path, a data frame or arrays by name.
             bench: Which bench it is of; may be left out where there is one.
-            heldout: It judges the result and takes no other part.
+            heldout: It evaluates the result and takes no part in fit and search.
             set: What was different in it: `{"load.mass_kg": 2.0}`.
         """
         self._refuse_if_loaded()
@@ -134,32 +134,32 @@ def as_study(
     heldout: RecordingLike | Iterable[RecordingLike],
 ) -> Study:
     """The study that the arguments of `diagnose` and `fit` describe."""
-    judges = [heldout] if is_one(heldout) else list(heldout)  # type: ignore[arg-type]
+    held_out = [heldout] if is_one(heldout) else list(heldout)  # type: ignore[arg-type]
     if isinstance(recordings, str | os.PathLike) and os.fspath(recordings).lower().endswith(".toml"):
         recordings = Study.load(recordings)
     if isinstance(recordings, Study):
-        if rig is not None or judges:
+        if rig is not None or held_out:
             message = "a study names its rigs and recordings itself; leave out rig and heldout"
             raise InputError(message, hint="leave out rig and heldout")
         return recordings
     if rig is None:
         raise InputError("no rig; name it with rig=, or give a study", hint="name it with rig=, or give a study")
     believed = as_rig(rig)
-    learned = [recordings] if is_one(recordings) else list(recordings)  # type: ignore[arg-type]
-    for judge in judges:
-        if isinstance(judge, str | os.PathLike):
-            others = [other for other in learned if isinstance(other, str | os.PathLike)]
-            same = any(os.path.realpath(judge) == os.path.realpath(other) for other in others)
+    training = [recordings] if is_one(recordings) else list(recordings)  # type: ignore[arg-type]
+    for one in held_out:
+        if isinstance(one, str | os.PathLike):
+            others = [other for other in training if isinstance(other, str | os.PathLike)]
+            same = any(os.path.realpath(one) == os.path.realpath(other) for other in others)
         else:
-            same = any(judge is other for other in learned)
+            same = any(one is other for other in training)
         if same:
-            what = os.fspath(judge) if isinstance(judge, str | os.PathLike) else "a recording"
-            message = f"{what}: given as training and as held out; a judge must be another recording"
-            raise InputError(message, what, hint="a judge must be another recording")
+            what = os.fspath(one) if isinstance(one, str | os.PathLike) else "a recording"
+            message = f"{what}: given as training and as held out; a held-out recording must not be a training recording"
+            raise InputError(message, what, hint="a held-out recording must not be a training recording")
     study = Study(believed.name)
     study.add_bench("bench", believed)
-    for recording in learned:
+    for recording in training:
         study.add_recording(recording)
-    for judge in judges:
-        study.add_recording(judge, heldout=True)
+    for recording in held_out:
+        study.add_recording(recording, heldout=True)
     return study

@@ -34,7 +34,7 @@ class Fit:
     channels: tuple[ChannelError, ...]
     """Differences between recordings and replays, before and after."""
     groups: tuple[str, ...]
-    """Products of parameters of which the recordings tell no more than the product."""
+    """Products of parameters of which the recordings determine the product only."""
     unseen: tuple[str, ...]
     """Parameters on which the recordings say nothing."""
     rigs: dict[str, Rig]
@@ -75,7 +75,8 @@ def diagnose(
     Args:
         recordings: Recordings to learn from (paths, `Recording`s, data frames, arrays by name), a `Study`, or the path of a study file.
         rig: What is believed about the bench: a `Rig` or a path. A study names its own.
-        heldout: Recordings that judge the diagnosis and take no other part; without them every third second of the others is held out.
+        heldout: Recordings that evaluate the diagnosis and take no part in fit and search; without them every third second of the others is
+            held out.
         also: Effects to be tried that are tried on request only.
         hypotheses: Functions of your own, as further terms of the search; `Diagnosis.hypotheses` says what each does.
         progress: Shows a bar on stderr; or a function, see `ProgressLike`.
