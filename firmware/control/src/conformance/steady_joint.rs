@@ -45,7 +45,7 @@ impl SteadyJoint {
         // With the default parameters, A/code and all: 24 V at 2 Ω are 1787 codes, and 0.9 V·s/rad at 10⁴ ticks/s 0.64 code for 2⁻²⁰ rad a tick.
         let driven = (i32::from(self.duty_raw) * 1787) >> 15;
         let back_emf = (self.turned_raw * 654) >> 10;
-        let zero = 2043 + self.below(10) as i32;
+        let zero = 2043 + self.below(10).cast_signed();
         TickInput {
             encoder,
             // 30 N ± 0.5 N; a code that stays the same is a fault.
