@@ -2,9 +2,10 @@
 
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
+use crate::progress::{Progress, Quiet, ended_early};
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::simulation::{Prediction, ReplayInput};
+use crate::simulation::{Prediction, ReplayInput, replay_watched};
 
 /// Simulates `rig` with the inputs of `recording`: one row a recorded sample, `t_s` and every output role.
 ///
@@ -13,9 +14,23 @@ use crate::simulation::{Prediction, ReplayInput};
 /// # Errors
 /// What the rig or the recording lacks for a replay; exit status 1, if the simulated joint runs away.
 pub fn predict(rig: &Rig, recording: &Recording) -> Result<Recording, Failure> {
+    predict_watched(rig, recording, &Quiet)
+}
+
+/// Like [`predict`]; fails at the next sample when `progress` asks for an early end.
+///
+/// # Errors
+/// As [`predict`]; exit status 1 after an early end.
+pub fn predict_watched(
+    rig: &Rig,
+    recording: &Recording,
+    progress: &dyn Progress,
+) -> Result<Recording, Failure> {
     let model = JointModel::from_rig(rig, recording)?;
     let input = ReplayInput::new(&model, recording)?;
-    let prediction = crate::simulation::replay(&model, &input)?;
+    let Some(prediction) = replay_watched(&model, &input, progress)? else {
+        return Err(ended_early(&format!("replay of {}", recording.source())));
+    };
     refuse_runaway(&prediction, recording)?;
     let source = format!("replay of {}", recording.source());
     let mut predicted = Recording::new(source, recording.t_s().to_vec());

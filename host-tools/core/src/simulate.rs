@@ -11,6 +11,7 @@ use bowden_model::plant::{InputBoundary, OutputBoundary, Plant, PlantConfig, Ste
 use bowden_model::transmission::Outside;
 
 use crate::outcome::Failure;
+use crate::progress::{Progress, Quiet, ended_early};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -99,6 +100,19 @@ pub struct RunOptions {
 /// # Errors
 /// When the rig lacks a part of a forward run; exit status 1, if the simulated joint runs away.
 pub fn run(rig: &Rig, reference: &Reference, options: RunOptions) -> Result<Recording, Failure> {
+    run_watched(rig, reference, options, &Quiet)
+}
+
+/// Like [`run`]; fails at the next sample when `progress` asks for an early end.
+///
+/// # Errors
+/// As [`run`]; exit status 1 after an early end.
+pub fn run_watched(
+    rig: &Rig,
+    reference: &Reference,
+    options: RunOptions,
+    progress: &dyn Progress,
+) -> Result<Recording, Failure> {
     let Some(motor) = rig.joint.motor else {
         return Err(Failure::bad_input(format!(
             "rig `{}`: no [motor], which a forward run needs; add it or use replay",
@@ -130,6 +144,9 @@ pub fn run(rig: &Rig, reference: &Reference, options: RunOptions) -> Result<Reco
     let mut t_s = Vec::with_capacity(samples);
     let mut columns = vec![Vec::with_capacity(samples); channels.len()];
     for sample in 0..samples {
+        if progress.interrupted() {
+            return Err(ended_early(&format!("simulation of `{}`", rig.name)));
+        }
         let now_s = sample as f64 / options.rate_hz;
         for tick in 0..ticks {
             let tick_at_s = now_s + tick as f64 * tick_s;

@@ -19,11 +19,13 @@ use bowden_model::channel::Channel;
 
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
+use crate::progress::Progress;
 use crate::reconstruct::moving_average;
 
 pub(crate) use delay_line::DelayLine;
 pub use input::ReplayInput;
 pub use prediction::{Prediction, Sink};
+use prediction::{StoppedBy, Watched};
 use run::{Guide, Run};
 pub use sensors::through;
 
@@ -54,14 +56,33 @@ pub fn replay_of(
     input: &ReplayInput,
     outputs: &[Channel],
 ) -> Result<Prediction, Failure> {
-    let samples = input.t_s.len();
-    let guided = if model.drive()? == Drive::GuidedMotor { samples } else { 0 };
-    let mut prediction = Prediction {
-        channels: outputs.iter().map(|channel| (*channel, Vec::with_capacity(samples))).collect(),
-        guide_nm: Vec::with_capacity(guided),
-    };
+    let mut prediction = empty(model, input, outputs)?;
     replay_into(model, input, outputs, &mut prediction)?;
     Ok(prediction)
+}
+
+/// All outputs of the model; `None` when `progress` asks for an early end, which is looked for at every sample.
+///
+/// # Errors
+/// When the model cannot be driven by these inputs.
+pub fn replay_watched(
+    model: &JointModel,
+    input: &ReplayInput,
+    progress: &dyn Progress,
+) -> Result<Option<Prediction>, Failure> {
+    let mut watched = Watched { prediction: empty(model, input, &model.outputs)?, progress };
+    replay_into(model, input, &model.outputs, &mut watched)?;
+    Ok((!progress.interrupted()).then_some(watched.prediction))
+}
+
+/// A prediction without samples.
+fn empty(model: &JointModel, input: &ReplayInput, outputs: &[Channel]) -> Result<Prediction, Failure> {
+    let samples = input.t_s.len();
+    let guided = if model.drive()? == Drive::GuidedMotor { samples } else { 0 };
+    Ok(Prediction {
+        channels: outputs.iter().map(|channel| (*channel, Vec::with_capacity(samples))).collect(),
+        guide_nm: Vec::with_capacity(guided),
+    })
 }
 
 /// The same, sample by sample.
@@ -82,8 +103,13 @@ pub fn replay_into(
         return Ok(());
     }
     let stiffness_nm_per_rad = STIFF_GUIDE * input.cables_nm_per_rad;
-    let mut first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
+    let first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
+    let mut first = StoppedBy { prediction: first, sink };
     run.execute(Guide { stiffness_nm_per_rad, ahead_nm: &[] }, &[], &mut first);
+    let StoppedBy { prediction: first, sink } = first;
+    if sink.is_stopped() {
+        return Ok(());
+    }
     let half = (GUIDE_FILTER_S / input.step_s).round() as usize;
     let ahead_nm = moving_average(moving_average(first.guide_nm, half), half);
     let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE * input.cables_nm_per_rad, ahead_nm: &ahead_nm };

@@ -19,16 +19,16 @@ use crate::rig::NativeRig;
 /// Time between two looks at progress and signals: short for a hand on Ctrl-C, long beside what a look costs (microseconds).
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What the working thread has told of itself.
+/// What the working thread reports of itself.
 #[derive(Default)]
 struct Watched {
-    told: Mutex<Told>,
+    status: Mutex<Status>,
     ended: Condvar,
     stop: AtomicBool,
 }
 
 #[derive(Clone, Default, PartialEq)]
-struct Told {
+struct Status {
     stage: String,
     steps: u64,
     done: u64,
@@ -36,25 +36,25 @@ struct Told {
 }
 
 impl Watched {
-    fn tell(&self, change: impl FnOnce(&mut Told)) {
-        change(&mut self.told.lock().unwrap_or_else(PoisonError::into_inner));
+    fn update(&self, change: impl FnOnce(&mut Status)) {
+        change(&mut self.status.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// What there is after [`LOOK`], or at once when the work ends.
-    fn look(&self) -> Told {
-        let told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        let waited = self.ended.wait_timeout_while(told, LOOK, |told| !told.over);
+    fn look(&self) -> Status {
+        let status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.ended.wait_timeout_while(status, LOOK, |status| !status.over);
         waited.unwrap_or_else(PoisonError::into_inner).0.clone()
     }
 }
 
 impl Progress for Watched {
     fn stage(&self, name: &str, steps: u64) {
-        self.tell(|told| *told = Told { stage: name.to_owned(), steps, done: 0, over: false });
+        self.update(|status| *status = Status { stage: name.to_owned(), steps, done: 0, over: false });
     }
 
     fn advance(&self, steps: u64) {
-        self.tell(|told| told.done += steps);
+        self.update(|status| status.done += steps);
     }
 
     fn interrupted(&self) -> bool {
@@ -67,7 +67,7 @@ struct AtEnd<'a>(&'a Watched);
 
 impl Drop for AtEnd<'_> {
     fn drop(&mut self) {
-        self.0.tell(|told| told.over = true);
+        self.0.update(|status| status.over = true);
         self.0.ended.notify_all();
     }
 }
@@ -100,24 +100,24 @@ pub fn run<T: Send>(
                 None => work(&watched),
             }
         });
-        let mut shown = Told::default();
+        let mut shown = Status::default();
         loop {
-            let told = py.detach(|| watched.look());
+            let status = py.detach(|| watched.look());
             let mut looked = py.check_signals();
             if let Some(watcher) = watcher
-                && told != shown
+                && status != shown
             {
-                let called = watcher.call1((&told.stage, told.done, told.steps));
+                let called = watcher.call1((&status.stage, status.done, status.steps));
                 looked = looked.and(called.map(|_| ()));
             }
             if let Err(error) = looked {
                 watched.stop.store(true, Ordering::Relaxed);
                 early.get_or_insert(error);
             }
-            if told.over {
+            if status.over {
                 break;
             }
-            shown = told;
+            shown = status;
         }
         working.join()
     });
@@ -148,9 +148,9 @@ pub fn replay(
     recording: &Bound<'_, NativeRecording>,
 ) -> PyResult<NativeRecording> {
     let (rig, recording) = (rig.get().rig(), recording.get().recording());
-    let work = |_: &dyn Progress| {
+    let work = |progress: &dyn Progress| {
         let inputs = rig.accept_inputs(recording.clone())?;
-        let mut predicted = bowden_core::replay::predict(rig, &inputs)?;
+        let mut predicted = bowden_core::replay::predict_watched(rig, &inputs, progress)?;
         predicted.add_notes(inputs.notes().to_vec());
         Ok(predicted)
     };
@@ -181,7 +181,8 @@ pub fn simulate(
         None => Reference::of_motion(motion_named(motion).or_raise(py)?, seconds, seed),
     };
     let options = RunOptions { seconds, rate_hz, seed };
-    let work = |_: &dyn Progress| bowden_core::simulate::run(rig, &reference, options);
+    let work =
+        |progress: &dyn Progress| bowden_core::simulate::run_watched(rig, &reference, options, progress);
     whole(py, run(py, None, None, work)?).map(NativeRecording::new)
 }
 

@@ -63,6 +63,28 @@ def test_what_is_done_is_kept(folder, single):
     assert _contents(single) == before
 
 
+def test_ctrl_c_leaves_recordings_and_the_same_call_goes_on_with_them(folder, single, tmp_path):
+    sent = []
+
+    def watch(stage: str, done: int, steps: int) -> None:
+        if done == 1 and not sent:
+            sent.append(done)
+            # From another thread, as a terminal would: the main thread waits for the work.
+            threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
+
+    def survey(progress) -> bowden.Survey:
+        return bowden.survey(folder, rig=folder / "bench.toml", out=tmp_path, progress=progress, jobs=1)
+
+    with pytest.warns(bowden.StoppedEarlyWarning, match="stopped early: 3 recordings are left; the same call goes on with them"):
+        found = survey(watch)
+    assert (found.diagnosed, found.kept, found.left, found.failed) == (1, 0, 3, {})
+    assert polars.read_parquet(found.tables["recordings"])["status"].to_list() == ["done", "left", "left", "left"]
+    with pytest.warns(bowden.RepairedWarning, match="run-9.csv failed"):
+        found = survey(False)
+    assert (found.diagnosed, found.kept, found.left, list(found.failed)) == (2, 1, 0, ["b/run-9.csv"])
+    assert _contents(tmp_path) == _contents(single)
+
+
 def test_what_cannot_be_a_survey_is_refused(folder, tmp_path):
     for wrong in (
         lambda: bowden.survey(folder / "nowhere", out=tmp_path / "out"),

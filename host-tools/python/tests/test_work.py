@@ -151,15 +151,46 @@ def test_ctrl_c_ends_a_diagnosis_with_what_there_is(play):
     stages = []
 
     def watch(stage: str, done: int, steps: int) -> None:
-        if stage == "fitting effects" and stage not in stages:
+        # Noted first: the signal may end this call.
+        stages.append(stage)
+        if stage == "fitting effects" and stages.count(stage) == 1:
             # From another thread, as a terminal would: the main thread waits for the work.
             threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
-        stages.append(stage)
 
     with pytest.warns(bowden.StoppedEarlyWarning):
         d = bowden.diagnose(play / "train.csv", play / "rig.toml", progress=watch)
     assert not d.complete and d.verdict and d.rig.text
     assert "screening effects" in stages
+
+
+def test_ctrl_c_ends_a_fit_before_its_last_stage(play):
+    stages = []
+
+    def watch(stage: str, done: int, steps: int) -> None:
+        stages.append(stage)
+        if len(stages) == 1:
+            threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
+
+    with pytest.raises(KeyboardInterrupt):
+        bowden.fit(play / "train.csv", play / "rig.toml", progress=watch)
+    assert set(stages) == {"recalibrating"}
+
+
+def test_ctrl_c_ends_a_simulation_and_a_replay(rig):
+    # Ten hours, and a recording of 25 minutes: both take far longer than the signal.
+    t_s = np.arange(1_500_000) / 1000.0
+    driven = {"t_s": t_s, "theta_in_rad": 0.3 * np.sin(t_s), "duty": 0.1 * np.cos(t_s), "bus_v": np.full_like(t_s, 24.0)}
+    driven["theta_out_rad"] = 0.2 * np.sin(t_s)
+    long = bowden.Recording.from_arrays(driven)
+    for work in (lambda: bowden.simulate(rig, seconds=36_000.0, rate_hz=1.0), lambda: bowden.replay(long, rig)):
+        signalling = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+        over = False
+        with pytest.raises(KeyboardInterrupt):
+            signalling.start()
+            work()
+            over = True
+            signalling.join()
+        assert not over
 
 
 def test_an_exception_in_a_watcher_ends_the_work_and_is_raised(play):
@@ -176,6 +207,12 @@ def test_other_threads_go_on_while_work_runs(play):
     def count() -> None:
         while not over.wait(0.001):
             counted[0] += 1
+
+    calls = []
+
+    def watch(stage: str, done: int, steps: int) -> None:
+        begun = counted[0]
+        calls.append((begun, counted[0]))
 
     thread = threading.Thread(target=count)
     thread.start()
@@ -198,9 +235,3 @@ def test_progress_shows_a_bar_and_no_progress_shows_nothing(recording, rig, capf
         warnings.simplefilter("ignore")
         bowden.diagnose(recording, rig, progress=True)
     assert "%" in capfd.readouterr().err
-    calls = []
-
-    def watch(stage: str, done: int, steps: int) -> None:
-        begun = counted[0]
-        calls.append((begun, counted[0]))
-

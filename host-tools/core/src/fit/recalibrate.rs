@@ -4,7 +4,7 @@ use super::identifiability::{Group, Sensitivity};
 use super::objective::{Objective, Part, Series};
 use super::observed::Use;
 use super::recalibrated::{own_of_effect, recalibrated};
-use super::solver::solve;
+use super::solver::solve_watched;
 use super::variation::Variation;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
@@ -97,7 +97,8 @@ impl Recalibration {
 /// pretension and mass come back within 3 % (test `a_fit_recovers_what_was_simulated`).
 ///
 /// # Errors
-/// When there is no recording to learn from, one lacks an input, or a joint cannot be simulated.
+/// When there is no recording to learn from, one lacks an input, or a joint cannot be simulated; exit status 1 when `progress` asks for an
+/// early end of the fit.
 pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibration, Failure> {
     let model = &study.joint()?;
     let mut observed = study.observed(model)?;
@@ -113,7 +114,7 @@ pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibrati
     free.extend((0..model.effects.len()).flat_map(|effect| own_of_effect(model, effect)));
     progress.stage("recalibrating", 0);
     let before = objective.predict(model)?;
-    let solution = solve(objective, model, &free, PATIENCE)?;
+    let solution = solve_watched(objective, model, &free, PATIENCE, progress)?;
     let after = objective.predict(&solution.model)?;
     progress.stage("what the recordings can tell apart", 0);
     let sensitivity = Sensitivity::of(objective, &solution.model)?;

@@ -11,6 +11,7 @@ use super::free::Free;
 use super::objective::{Aspect, Entry, Objective, Part, Residuals, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
+use crate::progress::{Progress, Quiet, ended_early};
 use problem::Problem;
 
 /// Step of the difference quotients in the optimiser's coordinate that sees the slope through the roughness that stick,
@@ -77,7 +78,22 @@ pub fn solve(
     free: &[Free],
     patience: usize,
 ) -> Result<Solution, Failure> {
-    solve_in_rounds(objective, model, free, patience, &[COARSE_STEP, FINE_STEP, FINE_STEP])
+    solve_watched(objective, model, free, patience, &Quiet)
+}
+
+/// Like [`solve`]; fails at the next simulation when `progress` asks for an early end.
+///
+/// # Errors
+/// As [`solve`]; exit status 1 after an early end.
+pub fn solve_watched(
+    objective: &Objective,
+    model: &JointModel,
+    free: &[Free],
+    patience: usize,
+    progress: &dyn Progress,
+) -> Result<Solution, Failure> {
+    let rounds = [COARSE_STEP, FINE_STEP, FINE_STEP];
+    solve_knowing(objective, model, free, patience, &rounds, None, progress)
 }
 
 /// Like [`solve`] with the given steps of the difference quotients, one round each.
@@ -91,7 +107,7 @@ pub fn solve_in_rounds(
     patience: usize,
     rounds: &[f64],
 ) -> Result<Solution, Failure> {
-    solve_knowing(objective, model, free, patience, rounds, None)
+    solve_knowing(objective, model, free, patience, rounds, None, &Quiet)
 }
 
 /// What a fit of the same model without its last parameters knows.
@@ -114,7 +130,7 @@ pub fn solve_for_ranking(
     patience: usize,
     known: &Known,
 ) -> Result<Solution, Failure> {
-    solve_knowing(objective, model, free, patience, &[COARSE_STEP], Some(known))
+    solve_knowing(objective, model, free, patience, &[COARSE_STEP], Some(known), &Quiet)
 }
 
 fn solve_knowing(
@@ -124,6 +140,7 @@ fn solve_knowing(
     patience: usize,
     rounds: &[f64],
     known: Option<&Known>,
+    progress: &dyn Progress,
 ) -> Result<Solution, Failure> {
     let slopes = known.and_then(|known| known.jacobian);
     let [objective, judging] = &objective.split();
@@ -146,6 +163,7 @@ fn solve_knowing(
         objective,
         model,
         free,
+        progress,
         fixed: fixed.to_vec(),
         step,
         prior_weight,
@@ -177,6 +195,7 @@ fn solve_knowing(
             .with_xtol(3.0 * tolerance)
             .with_gtol(1e-6);
         let (problem, _report) = optimiser.minimize(problem);
+        refuse_interrupted(progress)?;
         ended = problem.simulated_slopes().map(|begun| (step, begun));
         (x, current) = (problem.x, problem.current);
         let mut newly = false;
@@ -207,12 +226,18 @@ fn solve_knowing(
             .collect();
         (jacobian, stds)
     };
+    refuse_interrupted(progress)?;
     let mut residuals = match problem.current {
         Some(residuals) => residuals,
         None => objective.residuals(&model)?,
     };
     residuals.values.extend(judging.residuals(&model)?.values);
     Ok(Solution { model, values, stds, residuals, spread: problem.prior_weight, jacobian })
+}
+
+/// A solution of which simulations are missing is none.
+fn refuse_interrupted(progress: &dyn Progress) -> Result<(), Failure> {
+    if progress.interrupted() { Err(ended_early("fit")) } else { Ok(()) }
 }
 
 /// Over how many blocks the residuals of the fitted model stay alike, on average: what is left is mostly the difference

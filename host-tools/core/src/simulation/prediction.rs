@@ -7,6 +7,7 @@ use bowden_model::effect_set::EffectSet;
 use super::input::ReplayInput;
 use super::sensors::through;
 use crate::outcome::Failure;
+use crate::progress::Progress;
 
 /// Predicted channels, one value a sample.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,6 +64,43 @@ pub trait Sink {
     /// The next sample: every output in the order in which they were asked for, and the torque that guided the motor, N·m at the input
     /// pulley, where one did.
     fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>);
+
+    /// Whether the replay is to end before the next sample.
+    fn is_stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Keeps everything until an early end is asked for.
+pub(super) struct Watched<'a> {
+    pub prediction: Prediction,
+    pub progress: &'a dyn Progress,
+}
+
+impl Sink for Watched<'_> {
+    fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>) {
+        self.prediction.sample(outputs, guide_nm);
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.progress.interrupted()
+    }
+}
+
+/// Keeps everything until another sink is stopped.
+pub(super) struct StoppedBy<'a, S> {
+    pub prediction: Prediction,
+    pub sink: &'a mut S,
+}
+
+impl<S: Sink> Sink for StoppedBy<'_, S> {
+    fn sample(&mut self, outputs: &[f64], guide_nm: Option<f64>) {
+        self.prediction.sample(outputs, guide_nm);
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.sink.is_stopped()
+    }
 }
 
 /// Keeps everything.

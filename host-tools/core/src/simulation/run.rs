@@ -64,6 +64,9 @@ impl Run<'_> {
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
         for k in 0..n {
+            if sink.is_stopped() {
+                return;
+            }
             let mut torque_sum = 0.0;
             let span_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
             if k > 0 {

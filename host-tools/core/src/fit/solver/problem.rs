@@ -21,6 +21,7 @@ use super::{COARSE_STEP, left_over, spread, training_rows};
 use crate::fit::free::Free;
 use crate::fit::objective::{Objective, Residuals};
 use crate::joint_model::JointModel;
+use crate::progress::Progress;
 
 /// Part of the promised fall of the squared residuals that a step has to keep for its slopes to be carried on.
 const KEPT: f64 = 0.25;
@@ -34,6 +35,8 @@ pub(super) struct Problem<'a> {
     pub(super) objective: &'a Objective,
     pub(super) model: &'a JointModel,
     pub(super) free: &'a [Free],
+    /// After a request to end early there are no residuals any more, which ends the optimiser.
+    pub(super) progress: &'a dyn Progress,
     pub(super) fixed: Vec<bool>,
     pub(super) step: f64,
     /// Factor of the priors: what a weighted residual is spread by. Where the model misses the data by twenty scales, a change
@@ -118,6 +121,9 @@ impl Problem<'_> {
     }
 
     fn residuals_at(&self, x: &DVector<f64>) -> Option<Residuals> {
+        if self.progress.interrupted() {
+            return None;
+        }
         self.objective.residuals(&self.model_at(x)).ok().filter(Residuals::is_finite)
     }
 
