@@ -158,7 +158,11 @@ fn the_log_is_read_from_the_start_of_the_image_on() {
     assert_eq!(image.rtt(), Some(BLOCK));
     let mut target = Target::attach(Port::plug(&chip, &Arc::default(), None)).unwrap();
     target.write(&image, true, &Quiet).unwrap();
-    let before = (chip.lock().unwrap().halts, chip.lock().unwrap().resets);
+    let counts = || {
+        let chip = chip.lock().unwrap();
+        (chip.halts, chip.resets)
+    };
+    let before = counts();
     let got = Mutex::new(Vec::new());
     let stop = || got.lock().unwrap().len() >= logged.len();
     target
@@ -168,8 +172,7 @@ fn the_log_is_read_from_the_start_of_the_image_on() {
         })
         .unwrap();
     assert!(*got.lock().unwrap() == logged);
-    let chip = chip.lock().unwrap();
-    assert_eq!((chip.halts, chip.resets), before);
+    assert_eq!(counts(), before);
 }
 
 #[test]
