@@ -137,7 +137,8 @@ impl RunArguments {
 
 /// What would be done.
 fn list(items: &[Item]) -> String {
-    items.iter().map(|item| format!("{:<24} {}\n", item.name, what(item))).collect()
+    let line = |item: &Item| format!("{:<24} {}\n", item.name, what(item));
+    items.iter().map(line).collect()
 }
 
 /// What a step does, in words.
