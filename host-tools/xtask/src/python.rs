@@ -121,7 +121,7 @@ pub fn install_wheel(environment: &Path, folder: &Path, profile: &str) -> Result
     let wheel = wheel_for_every_python(&files).map_err(|error| format!("{}: {error}", wheels.display()))?;
     println!("wheel: {}", wheel.display());
     let mut pip = pip(environment);
-    pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(&wheel);
+    pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(wheel);
     process::run(&mut pip, &[0])
 }
 
