@@ -1,4 +1,5 @@
-//! A joint in motion for those who count or time ticks: its encoders follow the reference, the current follows the duty, tensions are at rest.
+//! A joint in motion for those who count or time ticks: its encoders follow the reference, tensions are at rest, and the
+//! current is at rest or follows the duty.
 
 use super::amt22_frame;
 use crate::tick::{EncoderWord, TickInput, TickOutput};
@@ -17,13 +18,21 @@ pub struct SteadyJoint {
     /// Last change of the reference, 2⁻²⁰ rad a tick.
     turned_raw: i32,
     duty_raw: i16,
+    /// Whether the motor takes current.
+    has_current: bool,
 }
 
 impl SteadyJoint {
-    /// At angle zero.
+    /// At angle zero, with a motor that takes no current: after 44 s of the sine that is a fault.
     #[must_use]
     pub const fn new() -> Self {
-        Self { random: 1, sequence: 0, reference_raw: 0, turned_raw: 0, duty_raw: 0 }
+        Self { random: 1, sequence: 0, reference_raw: 0, turned_raw: 0, duty_raw: 0, has_current: false }
+    }
+
+    /// The same with the current of its duty, for runs of any length.
+    #[must_use]
+    pub const fn with_current() -> Self {
+        Self { has_current: true, ..Self::new() }
     }
 
     /// 0 to below `range`, at most 2¹⁶.
@@ -45,12 +54,11 @@ impl SteadyJoint {
         // With the default parameters, A/code and all: 24 V at 2 Ω are 1787 codes, and 0.9 V·s/rad at 10⁴ ticks/s 0.64 code for 2⁻²⁰ rad a tick.
         let driven = (i32::from(self.duty_raw) * 1787) >> 15;
         let back_emf = (self.turned_raw * 654) >> 10;
-        let zero = 2043 + self.below(10).cast_signed();
         TickInput {
             encoder,
             // 30 N ± 0.5 N; a code that stays the same is a fault.
             tension_raw: [0; 4].map(|_| (1463 + self.below(28)) as u16),
-            current_raw: (zero + driven - back_emf).clamp(0, 4095) as u16,
+            current_raw: (2043 + self.below(10).cast_signed() + driven - back_emf).clamp(0, 4095) as u16,
             bus_raw: (2700 + self.below(16)) as u16,
             bridge_fault: false,
         }
@@ -58,9 +66,9 @@ impl SteadyJoint {
 
     /// Follows the reference and the duty of a tick.
     pub const fn follow(&mut self, output: &TickOutput) {
-        self.turned_raw = output.sample.reference_raw - self.reference_raw;
+        self.turned_raw = if self.has_current { output.sample.reference_raw - self.reference_raw } else { 0 };
         self.reference_raw = output.sample.reference_raw;
-        self.duty_raw = output.duty_raw;
+        self.duty_raw = if self.has_current { output.duty_raw } else { 0 };
     }
 }
 
@@ -86,7 +94,7 @@ mod tests {
     fn a_controller_runs_on_it() {
         let parameters = Parameters::default();
         let mut controller = Controller::new(tick_config(&parameters).unwrap());
-        let (mut joint, mut orders) = (SteadyJoint::new(), Orders::default());
+        let (mut joint, mut orders) = (SteadyJoint::with_current(), Orders::default());
         let sine = reference_config(&parameters, SINE).unwrap();
         let commands = [
             (1, Command::Enter(Goal::Ready)),
