@@ -90,7 +90,7 @@ impl Bench {
         let mut bench = Self {
             controller: Controller::new(config),
             orders: Orders::default(),
-            joint: SteadyJoint::with_current(),
+            joint: SteadyJoint::new(),
         };
         bench.tick();
         bench.orders.command = Some(Command::Enter(Goal::Ready));

@@ -1,5 +1,5 @@
-//! A joint in motion for those who count or time ticks: its encoders follow the reference, tensions are at rest, and the
-//! current is at rest or follows the duty.
+//! A joint in motion for those who count or time ticks: its encoders follow the reference, the current follows the duty, tensions are
+//! at rest.
 
 use super::amt22_frame;
 use crate::tick::{EncoderWord, TickInput, TickOutput};
@@ -18,21 +18,13 @@ pub struct SteadyJoint {
     /// Last change of the reference, 2⁻²⁰ rad a tick.
     turned_raw: i32,
     duty_raw: i16,
-    /// Whether the motor takes current.
-    has_current: bool,
 }
 
 impl SteadyJoint {
-    /// At angle zero, with a motor that takes no current: after 44 s of the sine that is a fault.
+    /// At angle zero.
     #[must_use]
     pub const fn new() -> Self {
-        Self { random: 1, sequence: 0, reference_raw: 0, turned_raw: 0, duty_raw: 0, has_current: false }
-    }
-
-    /// The same with the current of its duty, for runs of any length.
-    #[must_use]
-    pub const fn with_current() -> Self {
-        Self { has_current: true, ..Self::new() }
+        Self { random: 1, sequence: 0, reference_raw: 0, turned_raw: 0, duty_raw: 0 }
     }
 
     /// 0 to below `range`, at most 2¹⁶.
@@ -66,9 +58,9 @@ impl SteadyJoint {
 
     /// Follows the reference and the duty of a tick.
     pub const fn follow(&mut self, output: &TickOutput) {
-        self.turned_raw = if self.has_current { output.sample.reference_raw - self.reference_raw } else { 0 };
+        self.turned_raw = output.sample.reference_raw - self.reference_raw;
         self.reference_raw = output.sample.reference_raw;
-        self.duty_raw = if self.has_current { output.duty_raw } else { 0 };
+        self.duty_raw = output.duty_raw;
     }
 }
 
@@ -94,7 +86,7 @@ mod tests {
     fn a_controller_runs_on_it() {
         let parameters = Parameters::default();
         let mut controller = Controller::new(tick_config(&parameters).unwrap());
-        let (mut joint, mut orders) = (SteadyJoint::with_current(), Orders::default());
+        let (mut joint, mut orders) = (SteadyJoint::new(), Orders::default());
         let sine = reference_config(&parameters, SINE).unwrap();
         let commands = [
             (1, Command::Enter(Goal::Ready)),
