@@ -141,6 +141,19 @@ fn a_cable_that_is_pulled_is_named_and_an_image_called_whole_is_whole() {
     }
 }
 
+/// What a target logs, to a length.
+fn log_of(target: Target, length: usize) -> Vec<u8> {
+    let got = Mutex::new(Vec::new());
+    let stop = || got.lock().unwrap().len() >= length;
+    target
+        .follow_log(BLOCK, &stop, &mut |bytes| {
+            got.lock().unwrap().extend_from_slice(bytes);
+            Ok(())
+        })
+        .unwrap();
+    got.into_inner().unwrap()
+}
+
 #[test]
 fn the_log_is_read_from_the_start_of_the_image_on() {
     let chip = chip();
@@ -163,15 +176,7 @@ fn the_log_is_read_from_the_start_of_the_image_on() {
         (chip.halts, chip.resets)
     };
     let before = counts();
-    let got = Mutex::new(Vec::new());
-    let stop = || got.lock().unwrap().len() >= logged.len();
-    target
-        .follow_log(BLOCK, &stop, &mut |bytes| {
-            got.lock().unwrap().extend_from_slice(bytes);
-            Ok(())
-        })
-        .unwrap();
-    assert!(*got.lock().unwrap() == logged);
+    assert!(log_of(target, logged.len()) == logged);
     assert_eq!(counts(), before);
 }
 
@@ -195,15 +200,7 @@ fn the_log_of_a_board_that_runs_is_read_without_a_write_or_a_reset() {
     let halts = chip.lock().unwrap().halts;
     let target = target.holding(&image()).unwrap();
     assert!(chip.lock().unwrap().is_debugged());
-    let got = Mutex::new(Vec::new());
-    let stop = || got.lock().unwrap().len() >= logged.len();
-    target
-        .follow_log(BLOCK, &stop, &mut |bytes| {
-            got.lock().unwrap().extend_from_slice(bytes);
-            Ok(())
-        })
-        .unwrap();
-    assert!(*got.lock().unwrap() == logged);
+    assert!(log_of(target, logged.len()) == logged);
     assert!(chip.lock().unwrap().flash.content == before);
     let runs_on = |halts: usize| {
         let chip = chip.lock().unwrap();

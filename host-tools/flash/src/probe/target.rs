@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bowden_core::progress::Progress;
+use bowden_core::progress::{Progress, Quiet};
 use probe_rs::flashing::{DownloadOptions, FlashProgress, ProgressEvent, ProgressOperation};
 use probe_rs::probe::Probe;
 use probe_rs::{Core, MemoryInterface, Permissions, Session};
@@ -105,13 +105,7 @@ impl Target {
         core.reset_and_halt(RESET_PATIENCE)
             .map_err(|error| failure("resetting the processor", false, &error))?;
         progress.stage("verifying", image.bytes() as u64);
-        for (address, block) in blocks(image) {
-            let mut found = vec![0; block.len()];
-            core.read(address.into(), &mut found)
-                .map_err(|error| failure(&format!("reading address {address:#010x}"), false, &error))?;
-            compare(address, block, &found)?;
-            progress.advance(block.len() as u64);
-        }
+        read_back(&mut core, image, progress, |during, error| failure(during, false, error))?;
         let starting = |error| failure("starting the image, which is written", false, &error);
         if let Some(rtt) = image.rtt().filter(|_| log) {
             core.write_32(rtt.into(), &[0; 4]).map_err(starting)?;
@@ -124,31 +118,23 @@ impl Target {
     /// # Errors
     /// [`FlashError::OtherImage`]; [`FlashError::Unread`].
     pub fn holding(mut self, image: &Image) -> Result<Self, FlashError> {
-        match self.compare(image) {
+        let unread = |during: &str, error: &dyn std::error::Error| FlashError::Unread {
+            during: during.to_owned(),
+            reason: words(error),
+        };
+        let compared = self.core(true).and_then(|mut core| read_back(&mut core, image, &Quiet, unread));
+        match compared {
             Ok(()) => Ok(self),
             Err(error) => {
                 self.let_go();
-                Err(error)
+                Err(match error {
+                    FlashError::Differs { address, found, expected } => {
+                        FlashError::OtherImage { address, found, expected }
+                    }
+                    other => other,
+                })
             }
         }
-    }
-
-    fn compare(&mut self, image: &Image) -> Result<(), FlashError> {
-        let mut core = self.core(true)?;
-        for (address, block) in blocks(image) {
-            let mut found = vec![0; block.len()];
-            core.read(address.into(), &mut found).map_err(|error| FlashError::Unread {
-                during: format!("reading address {address:#010x}"),
-                reason: words(&error),
-            })?;
-            compare(address, block, &found).map_err(|error| match error {
-                FlashError::Differs { address, found, expected } => {
-                    FlashError::OtherImage { address, found, expected }
-                }
-                other => other,
-            })?;
-        }
-        Ok(())
     }
 
     /// Ends the debugging of a processor that runs, without the end of the session of probe-rs, which halts it for a moment: that stops a joint.
@@ -171,12 +157,24 @@ impl Target {
     }
 }
 
-/// An image in pieces of [`BLOCK_BYTES`], with their addresses.
-fn blocks(image: &Image) -> impl Iterator<Item = (u32, &[u8])> {
-    image.runs().iter().flat_map(|run| {
-        let blocks = run.bytes.chunks(BLOCK_BYTES).enumerate();
-        blocks.map(|(index, block)| (run.address + (index * BLOCK_BYTES) as u32, block))
-    })
+/// Compares the flash with an image, piece by piece; `failed` names a piece that cannot be read.
+fn read_back(
+    core: &mut Core<'_>,
+    image: &Image,
+    progress: &dyn Progress,
+    failed: impl Fn(&str, &dyn std::error::Error) -> FlashError,
+) -> Result<(), FlashError> {
+    for run in image.runs() {
+        for (index, block) in run.bytes.chunks(BLOCK_BYTES).enumerate() {
+            let address = run.address + (index * BLOCK_BYTES) as u32;
+            let mut found = vec![0; block.len()];
+            core.read(address.into(), &mut found)
+                .map_err(|error| failed(&format!("reading address {address:#010x}"), &error))?;
+            compare(address, block, &found)?;
+            progress.advance(block.len() as u64);
+        }
+    }
+    Ok(())
 }
 
 fn failure(during: &str, whole: bool, error: &dyn std::error::Error) -> FlashError {
