@@ -91,7 +91,7 @@ impl Capture<'_> {
             Format::Csv | Format::GzippedCsv => vec![(sidecar(self.out), parameters.to_toml())],
         };
         let conversion = Conversion::new(parameters)?;
-        let rig = self.rig.map(|(name, load)| rig_file::Draft::new(name, parameters, load)).transpose()?;
+        let rig = self.rig_draft(session)?;
         let form = Form {
             format: self.format,
             conversion,
@@ -109,6 +109,10 @@ impl Capture<'_> {
             Failure::failed(format!("{out}: cannot be written: {reason}; choose another place"))
         })?;
         Ok(Recorder::new(file, form, self.out))
+    }
+
+    fn rig_draft(&self, session: &Session) -> Result<Option<rig_file::Draft>, LinkError> {
+        self.rig.map(|(name, load)| rig_file::Draft::new(name, session.parameters(), load)).transpose()
     }
 
     /// Takes ticks until the recording is long enough or the medium refuses.
@@ -173,9 +177,8 @@ impl Capture<'_> {
             gaps.push(last);
         }
         let mut known = evidence::end(recorder.tally(), &words(&end));
-        if let Some((name, load)) = self.rig {
+        if let Some(rig) = self.rig_draft(session)? {
             let bus_v = recorder.tally().bus_v.unwrap_or_default();
-            let rig = rig_file::Draft::new(name, session.parameters(), load)?;
             known.extend(END_GROUP, [("rig".to_owned(), rig.text(bus_v))]);
         }
         if !gaps.is_empty() {

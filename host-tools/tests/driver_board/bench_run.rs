@@ -305,7 +305,7 @@ fn an_excitation_is_carried_out_as_it_was_listed_and_another_rig_gets_another_on
         let largest = angles.iter().fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
         assert!(largest > 0.7 * amplitude && largest < 1.1 * 0.3, "{what}: {largest} rad");
     }
-    // A light weight on a long arm, on tendons that give way.
+    // Tendons that give way nine times as far.
     let other = rig.replace("axial_stiffness_n = 72900.0", "axial_stiffness_n = 8000.0");
     assert_ne!(rig, other);
     fs::write(place.join("rig.toml"), other).unwrap();
