@@ -99,7 +99,10 @@ def test_a_worker_of_a_cluster_that_dies_loses_nothing(folder, single, tmp_path)
     killed: list[int] = []
 
     def kill_one(stage: str, done: int, steps: int) -> None:
-        workers = [one for one in psutil.process_iter(["cmdline"]) if (one.info["cmdline"] or [""])[0].startswith("ray::_one")]
+        # Of this process: another one of the machine may use Ray, too.
+        own = {child.pid for child in psutil.Process().children(recursive=True)}
+        named = [one for one in psutil.process_iter(["cmdline"]) if (one.info["cmdline"] or [""])[0].startswith("ray::_one")]
+        workers = [one for one in named if one.pid in own]
         if workers and not killed:
             killed.append(workers[0].pid)
             workers[0].send_signal(signal.SIGKILL)
