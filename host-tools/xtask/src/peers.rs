@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use crate::process::{self, built, cargo, target_folder, workspace};
+use crate::process::{self, Said, built, cargo, target_folder, workspace};
 use crate::prove::provenance;
 use crate::python;
 
@@ -26,7 +26,7 @@ pub fn run() -> Result<(), String> {
     let interpreter = python::interpreter()?;
     let folder = target_folder()?.join("python");
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let environment = python::environment(&interpreter, &folder, "peers", PACKAGES)?;
+    let environment = python::environment(&interpreter, &folder, ("peers", PACKAGES), Said::Here)?;
     let mut figures = String::new();
     for (package, target) in BENCHES {
         println!("\n== {target}");
@@ -40,7 +40,7 @@ pub fn run() -> Result<(), String> {
     println!("\n== diagnosis, beside other tools");
     let rivals = folder.join("rivals.md");
     fs::write(&rivals, diagnoses()?).map_err(|error| format!("{}: {error}", rivals.display()))?;
-    python::install_wheel(&environment, &folder, "release")?;
+    python::install_wheel(&environment, &folder, "release", Said::Here)?;
     println!("\n== simulation and replay, against MuJoCo, scipy and diffrax");
     let mut script = Command::new(python::program(&environment, "python"));
     script.arg(workspace().join(SCRIPT)).arg("--folder").arg(&folder).arg("--files").arg(&files);

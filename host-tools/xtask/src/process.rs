@@ -43,6 +43,29 @@ pub fn run(command: &mut Command, accepted: &[i32]) -> Result<(), String> {
     }
 }
 
+/// Where programs write what they say.
+#[derive(Clone, Copy, Debug)]
+pub enum Said<'a> {
+    /// To the terminal of this program.
+    Here,
+    /// Into a file, because other programs write to the terminal at the same time.
+    Into(&'a File),
+}
+
+impl Said<'_> {
+    /// Runs a program to its end, as [`run`] does where only 0 is accepted.
+    ///
+    /// # Errors
+    /// As [`run`]; when the file cannot be written.
+    pub fn run(self, command: &mut Command) -> Result<(), String> {
+        if let Self::Into(file) = self {
+            let stream = || file.try_clone().map_err(|error| format!("a log of tests: {error}"));
+            command.stdout(stream()?).stderr(stream()?);
+        }
+        run(command, &[0])
+    }
+}
+
 /// What a program writes to standard output.
 ///
 /// # Errors

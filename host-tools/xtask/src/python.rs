@@ -4,10 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::process::{self, built, cargo, find_program, target_folder, workspace};
+use crate::process::{self, Said, built, cargo, find_program, target_folder, workspace};
 
 /// Package and crate, below the workspace.
 const PACKAGE: &str = "host-tools/python";
+
+/// Folder of environments and wheels, below cargo's target folder.
+const FOLDER: &str = "python";
+
+/// Name of the environment of the tests, and the file of its packages.
+const OF_TESTS: (&str, &str) = ("environment", "requirements.txt");
 
 /// The crate: only Python loads it, so it is no default member of the workspace.
 pub const CRATE: &str = "bowden-python";
@@ -25,21 +31,29 @@ pub fn interpreter() -> Result<PathBuf, String> {
         .map_err(|_| format!("{} is older than 3.11 or has no venv; name another in PYTHON", path.display()))
 }
 
-/// Builds the wheel, installs it and runs pytest; `programs_are_built` says whether the tests of the host have built what these tests run.
+/// Makes the environment of the tests if there is an interpreter; [`tests`] says why it could not be made.
+pub fn prepare(said: Said) {
+    if let (Ok(interpreter), Ok(target)) = (interpreter(), target_folder()) {
+        let _ = environment(&interpreter, &target.join(FOLDER), OF_TESTS, said);
+    }
+}
+
+/// Builds the wheel, installs it and runs pytest, which say what they say to `said`; `programs_are_built` says whether the tests of the host
+/// have built what these tests run.
 ///
 /// # Errors
 /// When a package cannot be installed, the wheel does not build, or a test fails.
-pub fn tests(programs_are_built: bool) -> Result<String, String> {
+pub fn tests(programs_are_built: bool, said: Said) -> Result<String, String> {
     let interpreter = match interpreter() {
         Ok(interpreter) => interpreter,
         Err(reason) => return Ok(format!("skipped: {reason}")),
     };
-    let folder = target_folder()?.join("python");
-    let environment = environment(&interpreter, &folder, "environment", "requirements.txt")?;
+    let folder = target_folder()?.join(FOLDER);
+    let environment = environment(&interpreter, &folder, OF_TESTS, said)?;
     if !programs_are_built {
-        process::run(&mut cargo(&["build", "--package", "bowden", "--package", "virtual-bench"]), &[0])?;
+        said.run(&mut cargo(&["build", "--package", "bowden", "--package", "virtual-bench"]))?;
     }
-    install_wheel(&environment, &folder, "dev")?;
+    install_wheel(&environment, &folder, "dev", said)?;
 
     let counts = folder.join("tests.xml");
     let notebooks = folder.join("notebooks");
@@ -50,9 +64,9 @@ pub fn tests(programs_are_built: bool) -> Result<String, String> {
         .env("BOWDEN_BIN", built("debug", "bowden")?)
         .env("VIRTUAL_BENCH", built("debug", "virtual-bench")?);
     pytest.env("BOWDEN_NOTEBOOKS", &notebooks).env("MPLBACKEND", "agg").env("PYTHONDONTWRITEBYTECODE", "1");
-    let ended = process::run(&mut pytest, &[0]);
-    let said = fs::read_to_string(&counts).map_err(|error| format!("{}: {error}", counts.display()))?;
-    let counts = Counts::read(&said).ok_or_else(|| format!("{}: no counts of tests", counts.display()))?;
+    let ended = said.run(&mut pytest);
+    let report = fs::read_to_string(&counts).map_err(|error| format!("{}: {error}", counts.display()))?;
+    let counts = Counts::read(&report).ok_or_else(|| format!("{}: no counts of tests", counts.display()))?;
     match ended {
         Ok(()) if counts.passed() == 0 => Err("no test has run".to_owned()),
         Ok(()) => Ok(counts.to_string()),
@@ -60,11 +74,16 @@ pub fn tests(programs_are_built: bool) -> Result<String, String> {
     }
 }
 
-/// The environment of a name with the pinned packages of a file of the package, made anew when these have changed.
+/// The environment of a name, below `folder`, with the pinned packages of a file of the package, made anew when these have changed.
 ///
 /// # Errors
 /// When it cannot be made, or a package cannot be installed.
-pub fn environment(interpreter: &Path, folder: &Path, name: &str, packages: &str) -> Result<PathBuf, String> {
+pub fn environment(
+    interpreter: &Path,
+    folder: &Path,
+    (name, packages): (&str, &str),
+    said: Said,
+) -> Result<PathBuf, String> {
     let requirements = workspace().join(PACKAGE).join(packages);
     let wanted = fs::read(&requirements).map_err(|error| format!("{}: {error}", requirements.display()))?;
     let environment = folder.join(name);
@@ -73,10 +92,10 @@ pub fn environment(interpreter: &Path, folder: &Path, name: &str, packages: &str
         return Ok(environment);
     }
     println!("Python environment: installing the packages of {}", requirements.display());
-    process::run(Command::new(interpreter).args(["-m", "venv", "--clear"]).arg(&environment), &[0])?;
+    said.run(Command::new(interpreter).args(["-m", "venv", "--clear"]).arg(&environment))?;
     let mut pip = pip(&environment);
     pip.args(["install", "--quiet", "--only-binary", ":all:", "--requirement"]).arg(&requirements);
-    process::run(&mut pip, &[0])?;
+    said.run(&mut pip)?;
     fs::write(&installed, wanted).map_err(|error| format!("{}: {error}", installed.display()))?;
     Ok(environment)
 }
@@ -107,7 +126,7 @@ fn wheel_for_every_python(files: &[PathBuf]) -> Result<&Path, String> {
 ///
 /// # Errors
 /// When it does not build, is not of the stable ABI, or cannot be installed.
-pub fn install_wheel(environment: &Path, folder: &Path, profile: &str) -> Result<(), String> {
+pub fn install_wheel(environment: &Path, folder: &Path, profile: &str, said: Said) -> Result<(), String> {
     let wheels = folder.join("wheels");
     // Of an earlier version nothing may be left that could be installed instead.
     let _ = fs::remove_dir_all(&wheels);
@@ -115,14 +134,14 @@ pub fn install_wheel(environment: &Path, folder: &Path, profile: &str) -> Result
     maturin.current_dir(workspace()).args(["build", "--profile", profile, "--locked", "--manifest-path"]);
     maturin.arg(format!("{PACKAGE}/Cargo.toml")).arg("--out").arg(&wheels);
     maturin.arg("--interpreter").arg(program(environment, "python"));
-    process::run(&mut maturin, &[0])?;
+    said.run(&mut maturin)?;
     let entries = fs::read_dir(&wheels).map_err(|error| format!("{}: {error}", wheels.display()))?;
     let files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     let wheel = wheel_for_every_python(&files).map_err(|error| format!("{}: {error}", wheels.display()))?;
     println!("wheel: {}", wheel.display());
     let mut pip = pip(environment);
     pip.args(["install", "--quiet", "--no-deps", "--force-reinstall"]).arg(wheel);
-    process::run(&mut pip, &[0])
+    said.run(&mut pip)
 }
 
 fn pip(environment: &Path) -> Command {

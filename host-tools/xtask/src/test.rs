@@ -1,11 +1,13 @@
 //! `cargo xtask test`: all tests that need no hardware, those of the board's release images among them.
 
 use std::fmt;
+use std::fs::File;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::firmware::Image;
 use crate::parts::Parts;
-use crate::process::{self, built, cargo, shared};
+use crate::process::{self, Said, built, cargo, shared, target_folder};
 use crate::tally::Tally;
 use crate::{browser, cross_target, firmware, python, selection, system_packages};
 
@@ -48,19 +50,13 @@ pub fn run(options: Options) -> Result<(), String> {
         }
         None => options.host().then(Programs::of_the_host),
     };
-    let mut command_is_built = false;
-    if let Some(programs) = programs {
-        let (built, took) = timed("build", || programs.build());
-        command_is_built = built.is_ok();
-        let (result, took) = match built {
-            Ok(()) => timed(programs.part, || programs.run()),
-            Err(reason) => (Err(reason), took),
-        };
-        outcomes.push(Outcome { part: programs.part, result, took });
-    }
-    if options.python() {
-        let (result, took) = timed("python", || python::tests(command_is_built));
-        outcomes.push(Outcome { part: "python", result, took });
+    match (programs, options.python()) {
+        (Some(programs), false) => {
+            outcomes.push(programs.built().map_or_else(|failed| failed, |()| programs.outcome()));
+        }
+        (Some(programs), true) => outcomes.extend(beside_python(&programs)?),
+        (None, true) => outcomes.push(Outcome::of("python", || python::tests(false, Said::Here))),
+        (None, false) => {}
     }
     println!();
     for outcome in &outcomes {
@@ -76,6 +72,44 @@ struct Outcome {
     part: &'static str,
     result: Result<String, String>,
     took: Duration,
+}
+
+impl Outcome {
+    fn of(part: &'static str, run: impl FnOnce() -> Result<String, String>) -> Self {
+        let (result, took) = timed(part, run);
+        Self { part, result, took }
+    }
+}
+
+/// Runs the test programs and, when they are built, the Python tests beside them: single tests of either leave a processor idle. What the
+/// latter say goes to a file, and is shown at the end.
+///
+/// # Errors
+/// When there is no place for that file.
+fn beside_python(programs: &Programs) -> Result<[Outcome; 2], String> {
+    let path = target_folder()?.join("python-tests.log");
+    let shown = |error: std::io::Error| format!("{}: {error}", path.display());
+    let log = File::create(&path).map_err(shown)?;
+    let said = Said::Into(&log);
+    let outcomes = thread::scope(|scope| {
+        // From a network, while processors build.
+        let prepared = scope.spawn(|| python::prepare(said));
+        let built = programs.built();
+        // It says why it failed when it is made again.
+        let _ = prepared.join();
+        let are_built = built.is_ok();
+        let python = scope.spawn(move || Outcome::of("python", || python::tests(are_built, said)));
+        let programs = match built {
+            Ok(()) => programs.outcome(),
+            Err(failed) => failed,
+        };
+        let panicked =
+            |_| Outcome { part: "python", result: Err("panicked".to_owned()), took: Duration::ZERO };
+        [programs, python.join().unwrap_or_else(panicked)]
+    });
+    println!("\n== tests: what those of Python said");
+    std::io::copy(&mut File::open(&path).map_err(shown)?, &mut std::io::stdout()).map_err(shown)?;
+    Ok(outcomes)
 }
 
 impl fmt::Display for Outcome {
@@ -126,6 +160,17 @@ impl Programs {
 
     fn of_the_board(images: Vec<Image>) -> Self {
         Self { part: "board", selected: selection::emulated_board().collect(), images, host: false }
+    }
+
+    /// Builds them; what became of them when they do not build.
+    fn built(&self) -> Result<(), Outcome> {
+        let (result, took) = timed("build", || self.build());
+        result.map_err(|reason| Outcome { part: self.part, result: Err(reason), took })
+    }
+
+    /// Runs what is built.
+    fn outcome(&self) -> Outcome {
+        Outcome::of(self.part, || self.run())
     }
 
     /// Builds them, and the command that they start.
