@@ -13,6 +13,7 @@ use crate::commands::{
     simulate::SimulateArguments,
 };
 use crate::progress::{self, under_way};
+use crate::usage;
 
 /// Finds which physics a simulated tendon-driven joint lacks, from recordings of the real one
 #[derive(Debug, Parser)]
@@ -100,9 +101,10 @@ pub fn exit_on_panic() {
 
 /// Runs a command line, says on stderr what there is to say, and returns the exit status.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitStatus {
-    let result = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let result = match Cli::try_parse_from(&arguments) {
         Ok(cli) => dispatch(&cli),
-        Err(error) => usage(&error),
+        Err(error) => not_understood(&error, &arguments),
     };
     match &result {
         Ok(outcome) => outcome.notes().iter().for_each(|note| say(note)),
@@ -155,21 +157,12 @@ fn say(line: &str) {
 }
 
 /// Help and version are results; anything else is bad usage, in one line.
-fn usage(error: &clap::Error) -> Result<Outcome, Failure> {
+fn not_understood(error: &clap::Error, arguments: &[OsString]) -> Result<Outcome, Failure> {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
         crate::commands::print(&error.render().to_string())?;
         return Ok(Outcome::done());
     }
-    let text = error.render().to_string();
-    let parts: Vec<&str> = text
-        .lines()
-        .map(str::trim)
-        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
-        .filter(|line| !line.is_empty())
-        .collect();
-    let what = parts.join(" ");
-    let what = what.strip_prefix("error: ").unwrap_or(&what);
-    Err(Failure::bad_input(format!("{what}; see `bowden --help`")))
+    Err(Failure::bad_input(usage::line(error, &Cli::command(), arguments)))
 }
 
 /// What panicked and where, in one line.

@@ -10,3 +10,4 @@ pub mod interrupt;
 mod machine;
 pub mod monitor;
 pub mod progress;
+mod usage;

@@ -520,18 +520,35 @@ fn files_that_are_no_files_are_refused() {
 #[test]
 fn bad_usage_is_one_line_and_exit_status_2() {
     let folder = tempfile::tempdir().unwrap();
-    for arguments in [
-        vec![],
-        vec!["convrt", "a", "b"],
-        vec!["convert", "a.csv"],
-        vec!["convert", "a.csv", "b.csv", "--bogus"],
-        vec!["check"],
-        vec!["--jobs", "0", "check", "a.csv"],
-        vec!["--jobs", "many", "check", "a.csv"],
-    ] {
-        let (status, stdout, stderr) = bowden(folder.path(), &arguments);
+    let cases: [(&[&str], &str, &str); 10] = [
+        (&[], "", "bowden"),
+        (&["convrt", "a", "b"], "unrecognized subcommand 'convrt'", "bowden"),
+        (&["convert", "a.csv"], "were not provided: <OUTPUT>", "bowden convert"),
+        (&["convert", "a.csv", "b.csv", "--bogus"], "unexpected argument '--bogus' found", "bowden convert"),
+        (&["check"], "were not provided", "bowden check"),
+        (&["--jobs", "0", "check", "a.csv"], "invalid value '0' for '--jobs <N>'", "bowden check"),
+        (&["--jobs", "many", "check", "a.csv"], "invalid value 'many' for '--jobs <N>'", "bowden check"),
+        (
+            &["send", "status", "--port", "sim"],
+            "unexpected argument '--port' found; it belongs before `status`; ",
+            "bowden send status",
+        ),
+        (&["send", "status", "--bogus"], "unexpected argument '--bogus' found; see", "bowden send status"),
+        // The name of a command may be a value.
+        (
+            &["convert", "check", "--bogus"],
+            "unexpected argument '--bogus' found; to pass '--bogus'",
+            "bowden convert",
+        ),
+    ];
+    for (arguments, what, of) in cases {
+        let (status, stdout, stderr) = bowden(folder.path(), arguments);
         assert_eq!((status, stdout.as_str(), stderr.lines().count()), (2, "", 1), "{arguments:?}: {stderr}");
-        assert!(stderr.starts_with("bowden: ") && stderr.contains("see `bowden --help`"), "{stderr}");
+        let next = format!("; see `{of} --help`\n");
+        assert!(
+            stderr.starts_with("bowden: ") && stderr.contains(what) && stderr.ends_with(&next),
+            "{stderr}"
+        );
     }
     let (status, stdout, stderr) = bowden(folder.path(), &["--help"]);
     assert_eq!((status, stderr.as_str()), (0, ""));

@@ -174,7 +174,7 @@ fn a_probe_that_is_not_there_is_said_with_what_to_do() {
         folder.path(),
         &["flash", "a.elf", "--probe", "ST-LINK"],
         "invalid value 'ST-LINK' for '--probe <VID:PID[:SERIAL]>': expected VID:PID or VID:PID:SERIAL",
-        "see `bowden --help`",
+        "see `bowden flash --help`",
     );
 }
 
@@ -192,7 +192,7 @@ fn a_boot_loader_that_is_not_there_is_said_with_what_to_do() {
         &["--port", "auto"],
     ] {
         let arguments = [&["flash", "a.elf"], wrong].concat();
-        refused(folder.path(), &arguments, "", "see `bowden --help`");
+        refused(folder.path(), &arguments, "", "see `bowden flash --help`");
     }
     if !(NativeUsb { board: (0x1209, 0xb0d7) }).boot_loaders().is_empty() {
         println!("skipped: a boot loader is connected");
@@ -217,7 +217,7 @@ fn the_log_of_a_running_board_needs_an_image_with_a_place_for_it() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.elf"), Elf::firmware().bytes()).unwrap();
     fs::write(folder.path().join("a.rtt"), "").unwrap();
-    let see_help = "see `bowden --help`";
+    let see_help = "see `bowden log --help`";
     refused(
         folder.path(),
         &["log", "a.elf"],

@@ -189,12 +189,12 @@ fn what_cannot_be_simulated_is_refused_in_one_line() {
             vec![MOTOR, LOAD, SENSORS],
             vec!["--motion", "zigzag"],
             "invalid value 'zigzag' for '--motion <NAME>' [possible values: lab, sine, triangle, multisine, \
-             staircase, rest]; see `bowden --help`",
+             staircase, rest]; see `bowden simulate --help`",
         ),
         (
             vec![MOTOR, LOAD, SENSORS],
             vec!["--motion", "sine", "--reference", "reference.csv"],
-            "the argument '--motion <NAME>' cannot be used with '--reference <FILE.csv>'; see `bowden --help`",
+            "the argument '--motion <NAME>' cannot be used with '--reference <FILE.csv>'; see `bowden simulate --help`",
         ),
         (
             vec![MOTOR, LOAD, SENSORS],

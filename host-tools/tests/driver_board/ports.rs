@@ -134,7 +134,7 @@ fn what_cannot_be_done_is_told_before_the_port_is_opened() {
     );
     assert_refused(
         &record(&["--out", "a.csv", "--rig", "r.toml", "--load", "2.5"]),
-        "invalid value '2.5' for '--load <KG,M>': expected KG,M such as 2.5,0.03; see `bowden --help`",
+        "invalid value '2.5' for '--load <KG,M>': expected KG,M such as 2.5,0.03; see `bowden record --help`",
     );
     assert_refused(
         &["faults", "--port", "/dev/ttyACM99", "--snapshot", "nowhere/s.csv"],
