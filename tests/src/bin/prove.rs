@@ -11,7 +11,7 @@ use std::thread;
 use bowden_tests::prove::lengths::{self, LENGTHENED, Lengths, lengths};
 use bowden_tests::prove::outcome::{Log, Outcome};
 use bowden_tests::prove::page::{Provenance, render};
-use bowden_tests::prove::plan::{Group, Plan, plans, quick_sample};
+use bowden_tests::prove::plan::{Group, Plan, plans, quick_sample, thinned};
 use bowden_tests::prove::rivals::{RivalOutcome, Rivals};
 use bowden_tests::prove::run::{key, run};
 use bowden_tests::prove::score::{concealed_shortly, said_shortly, score};
@@ -33,6 +33,9 @@ struct Options {
     /// May be repeated; proof.md stays as it is
     #[arg(long, value_name = "GROUP|EFFECT")]
     only: Vec<String>,
+    /// Only each N-th case of every group, for a page in a part of the time, which says so
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
+    every: u8,
     /// Seed of the whole run
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -155,6 +158,7 @@ fn prove(options: &Options) -> Result<bool, String> {
         threads,
         jobs,
         seed: options.seed,
+        every: usize::from(options.every),
     };
     let page = render(&summary, &rival_outcomes, &provenance);
     println!("\n{page}");
@@ -193,7 +197,7 @@ fn cost_of_length(tool: &Tool, plans: &[Plan], options: &Options) -> Result<bool
 
 /// The cases that the options ask for.
 fn chosen(options: &Options) -> Result<Vec<Plan>, String> {
-    let mut plans = plans(options.seed);
+    let mut plans = thinned(plans(options.seed), usize::from(options.every));
     for word in &options.only {
         if !plans.iter().any(|plan| plan.matches(word)) {
             let groups = Group::ALL.map(Group::name).join(", ");

@@ -26,6 +26,8 @@ pub struct Provenance {
     pub jobs: usize,
     /// Seed of the run.
     pub seed: u64,
+    /// Each which case of every group was run: 1 for all.
+    pub every: usize,
 }
 
 /// Writes the whole page; a table of rivals where there are any.
@@ -43,7 +45,7 @@ fn write(
     rivals: &[RivalOutcome],
     provenance: &Provenance,
 ) -> std::fmt::Result {
-    let Provenance { date, commit, machine, tool, threads, jobs, seed } = provenance;
+    let Provenance { date, commit, machine, tool, threads, jobs, seed, every } = provenance;
     let [quiet_n, noisy_n] = noise_levels_n();
     writeln!(page, "# Concealed effects, found or not\n")?;
     writeln!(
@@ -58,9 +60,10 @@ fn write(
         page,
         "| date | {date} |\n| commit | {commit} |\n| machine | {machine} |\n| program | {tool} |"
     )?;
+    let part = if *every > 1 { format!(", one of {every} of every group") } else { String::new() };
     writeln!(
         page,
-        "| run | seed {seed}, {jobs} at a time with {threads} threads each, {} cases |\n",
+        "| run | seed {seed}, {jobs} at a time with {threads} threads each, {} cases{part} |\n",
         summary.cases.len()
     )?;
 
@@ -244,6 +247,7 @@ mod tests {
             threads: 2,
             jobs: 1,
             seed: 1,
+            every: 2,
         }
     }
 
@@ -258,6 +262,7 @@ mod tests {
         let page = render(&summary, &[], &provenance());
         for line in [
             "| date | 2026-01-02 |",
+            "| run | seed 1, 1 at a time with 2 threads each, 2 cases, one of 2 of every group |",
             "| single effects: first name right | 0 of 1 (0.0 %) | ≥ 95 % | **missed** |",
             "| nothing or parameters only: false physics | 0 of 1 (0.0 %) | none | met |",
             "| joint_spring | joint_backlash | 1 |",

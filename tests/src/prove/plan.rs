@@ -392,6 +392,20 @@ pub fn quick_sample(plans: Vec<Plan>) -> Vec<Plan> {
         .collect()
 }
 
+/// Each `every`-th case of every group. Effects have four cases each, by strength and noise; from one to the next others of them are taken.
+#[must_use]
+pub fn thinned(plans: Vec<Plan>, every: usize) -> Vec<Plan> {
+    let mut seen = [0; Group::ALL.len()];
+    plans
+        .into_iter()
+        .filter(|plan| {
+            let place = seen[plan.group as usize];
+            seen[plan.group as usize] += 1;
+            (place + place / 4) % every == 0
+        })
+        .collect()
+}
+
 /// What the bench of a noise level shows, for the page.
 #[must_use]
 pub fn noise_levels_n() -> [f64; 2] {
@@ -492,6 +506,25 @@ mod tests {
         assert!(kinds.len() >= 3, "{kinds:?}");
         let effects: BTreeSet<&str> = singles.iter().map(|plan| plan.hidden()[0]).collect();
         assert_eq!(effects.len(), 12);
+    }
+
+    #[test]
+    fn half_of_the_cases_has_half_of_every_group_and_each_effect_at_both_strengths() {
+        assert_eq!(thinned(plans(1), 1), plans(1));
+        let (all, half) = (plans(1), thinned(plans(1), 2));
+        for group in Group::ALL {
+            let (of, kept) = (count(&all, group), count(&half, group));
+            assert!(2 * kept == of || 2 * kept == of + 1, "{}: {kept} of {of}", group.name());
+        }
+        let named = |word: &str| half.iter().filter(|plan| plan.name.contains(word)).count();
+        for (id, _) in ids(false) {
+            // Friction along the sheath or at one place has no strength.
+            let strengths =
+                [format!("single/{id}/clear/"), format!("single/{id}/weak/")].map(|word| named(&word));
+            assert!(strengths == [1, 1] || id == "distributed_friction", "{id}: {strengths:?}");
+        }
+        let noise = ["/quiet", "/noisy"].map(named);
+        assert!(noise[0].abs_diff(noise[1]) <= 4, "{noise:?}");
     }
 
     #[test]
