@@ -11,10 +11,13 @@
 //! | `drifts.parquet` | a recalibrated parameter of a bench over its recordings |
 //! | `survey.html` | the benches side by side |
 //!
+//! Tables and page are also written while the survey goes on, each time a tenth of what they hold is new ([`Interim`]).
+//!
 //! Equal recordings and rigs give equal files, bit for bit, whoever did the work and in which order. Each diagnosis runs on one thread and as
 //! many run at once as there are workers: several threads would wait for each other within a diagnosis.
 
 mod drift;
+mod interim;
 mod occurrences;
 mod page;
 mod parquet_file;
@@ -28,13 +31,14 @@ mod task;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::outcome::Failure;
 use crate::output;
 use crate::progress::Progress;
 
 pub use drift::{Drift, drifts};
+pub use interim::Interim;
 pub use plan::{Plan, RigRule};
 pub use rows::{Status, SurveyRow};
 pub use store::{PROGRAM, Store, Surveyed};
@@ -56,19 +60,50 @@ pub struct Summary {
     pub left: usize,
 }
 
-/// Diagnoses what is not done yet, and writes tables and page. A recording that cannot be diagnosed, or whose diagnosis panics, stops no
-/// other one.
+/// What became of the recordings that were to be diagnosed, so far.
+#[derive(Default)]
+struct Ended {
+    diagnosed: BTreeSet<String>,
+    failed: Vec<(String, String)>,
+}
+
+impl Ended {
+    /// Recordings of which neither is known.
+    fn left(&self, pending: &[&Task]) -> BTreeSet<String> {
+        let failed: BTreeSet<&String> = self.failed.iter().map(|(recording, _)| recording).collect();
+        let ended = |recording: &String| self.diagnosed.contains(recording) || failed.contains(recording);
+        pending.iter().map(|task| &task.recording).filter(|recording| !ended(recording)).cloned().collect()
+    }
+}
+
+/// Diagnoses what is not done yet, and writes tables and page: at the end, and in between whenever [`Interim`] says so. A recording that
+/// cannot be diagnosed, or whose diagnosis panics, stops no other one.
 ///
 /// # Errors
 /// When no recording could be diagnosed, with the reason of the first; when the medium refuses.
 pub fn survey(plan: &Plan, out: &Path, workers: usize, progress: &dyn Progress) -> Result<Summary, Failure> {
     let store = Store::open(out)?;
     let pending: Vec<&Task> = plan.tasks.iter().filter(|task| !store.has(task)).collect();
-    let mut summary = Summary { kept: plan.tasks.len() - pending.len(), ..Summary::default() };
+    let kept = plan.tasks.len() - pending.len();
     progress.stage("diagnosing recordings", pending.len() as u64);
     let next = AtomicUsize::new(0);
-    let failed = Mutex::new(Vec::new());
-    let diagnosed = Mutex::new(BTreeSet::new());
+    let ended = Mutex::new(Ended::default());
+    let interim = Mutex::new(Interim::default());
+    // Tables and page for what there is. Only a worker that finds nobody writing writes, so none waits.
+    let follow = || -> Result<(), Failure> {
+        let Ok(mut interim) = interim.try_lock() else { return Ok(()) };
+        let (mut failed, left) = {
+            let ended = lock(&ended);
+            let failed = ended.failed.len();
+            if !interim.is_due(kept + ended.diagnosed.len() + failed, failed) {
+                return Ok(());
+            }
+            (ended.failed.clone(), ended.left(&pending))
+        };
+        summarise(plan, &store, &mut failed, &left)?;
+        interim.written(plan.tasks.len() - left.len());
+        Ok(())
+    };
     let work = || -> Result<(), Failure> {
         while let Some(task) = pending.get(next.fetch_add(1, Ordering::Relaxed))
             && !progress.interrupted()
@@ -76,15 +111,15 @@ pub fn survey(plan: &Plan, out: &Path, workers: usize, progress: &dyn Progress) 
             match task.diagnose(&Silent(progress)) {
                 Ok(surveyed) if surveyed.diagnosis.complete => {
                     store.save(&surveyed)?;
-                    diagnosed.lock().unwrap_or_else(PoisonError::into_inner).insert(surveyed.recording);
+                    lock(&ended).diagnosed.insert(surveyed.recording);
                 }
                 // Ended early: nothing to keep.
                 Ok(_) => break,
                 Err(failure) => {
-                    let failure = (task.recording.clone(), failure.message().to_owned());
-                    failed.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
+                    lock(&ended).failed.push((task.recording.clone(), failure.message().to_owned()));
                 }
             }
+            follow()?;
             progress.advance(1);
         }
         Ok(())
@@ -98,16 +133,15 @@ pub fn survey(plan: &Plan, out: &Path, workers: usize, progress: &dyn Progress) 
                 .unwrap_or_else(|_| Err(Failure::failed("a worker ended by a defect of this program")))
         })
     })?;
-    let diagnosed = diagnosed.into_inner().unwrap_or_else(PoisonError::into_inner);
-    summary.diagnosed = diagnosed.len();
-    summary.failed = failed.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let failed: BTreeSet<&String> = summary.failed.iter().map(|(recording, _)| recording).collect();
-    let ended = |recording: &String| diagnosed.contains(recording) || failed.contains(recording);
-    let left: BTreeSet<String> =
-        pending.iter().map(|task| &task.recording).filter(|recording| !ended(recording)).cloned().collect();
-    summary.left = left.len();
-    summarise(plan, &store, &mut summary.failed, &left)?;
-    Ok(summary)
+    let mut ended = ended.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let left = ended.left(&pending);
+    summarise(plan, &store, &mut ended.failed, &left)?;
+    Ok(Summary { diagnosed: ended.diagnosed.len(), kept, failed: ended.failed, left: left.len() })
+}
+
+/// What a mutex holds, also after a panic: no holder leaves it half changed.
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Writes tables and page from the results that are there, but for those that `left` names; `failed` is put in the order of the plan.

@@ -6,8 +6,8 @@ mod sources;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock};
 
 use bowden_core::progress::{Progress, Quiet};
 use bowden_core::rig::{Assignment, Rig};
@@ -159,6 +159,66 @@ fn a_survey_says_which_bench_drifts_goes_on_where_it_stopped_and_gives_the_same_
     let summary = survey(&plan(&parts), &parts, 2, &Quiet).unwrap();
     assert_eq!((summary.diagnosed, summary.kept), (1, 3));
     assert_eq!(contents(&parts), contents(&whole));
+}
+
+/// Reads, each time a recording is done, what the table then says of all recordings.
+struct ReadsTheTable<'a> {
+    out: &'a Path,
+    read: Mutex<Vec<Vec<String>>>,
+}
+
+impl Progress for ReadsTheTable<'_> {
+    fn stage(&self, _name: &str, _steps: u64) {}
+
+    fn advance(&self, _steps: u64) {
+        let table = self.out.join("recordings.parquet");
+        let status = if table.exists() {
+            rows(&table).iter().map(|row| text(row, "status")).collect()
+        } else {
+            Vec::new()
+        };
+        assert_eq!(self.out.join("survey.html").exists(), !status.is_empty());
+        self.read.lock().unwrap().push(status);
+    }
+}
+
+#[test]
+fn tables_and_page_follow_while_a_survey_goes_on() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("recordings");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("rig.toml"), RIG).unwrap();
+    // No recording first: without a result there is nothing to write.
+    fs::write(folder.join("run-0.csv"), "").unwrap();
+    for seed in [1, 2] {
+        record(&folder.join(format!("run-{seed}.csv")), &[], seed);
+    }
+    let out = place.path().join("out");
+    let watcher = ReadsTheTable { out: &out, read: Mutex::default() };
+    let summary = survey(&Plan::new(&folder, &[], &out).unwrap(), &out, 1, &watcher).unwrap();
+    assert_eq!((summary.diagnosed, summary.failed.len()), (2, 1));
+    let read = watcher.read.into_inner().unwrap();
+    assert_eq!(read, [&[][..], &["failed", "done", "left"], &["failed", "done", "done"]]);
+
+    // Written anew by a run that finds everything done, tables and page are the same.
+    let after = contents(&out);
+    for name in ["recordings", "effects", "parameters", "drifts"] {
+        fs::remove_file(out.join(format!("{name}.parquet"))).unwrap();
+    }
+    fs::remove_file(out.join("survey.html")).unwrap();
+    survey(&Plan::new(&folder, &[], &out).unwrap(), &out, 1, &Quiet).unwrap();
+    assert_eq!(contents(&out), after);
+}
+
+#[test]
+fn a_table_that_cannot_be_written_ends_a_survey_at_the_first_recording() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("out");
+    fs::create_dir_all(out.join("effects.parquet")).unwrap();
+    let failure = survey(&plan(&out), &out, 1, &Quiet).unwrap_err();
+    assert!(failure.message().contains("effects.parquet: cannot be written: "), "{failure}");
+    let kept: Vec<PathBuf> = contents(&out.join("diagnoses")).into_keys().collect();
+    assert_eq!(kept, [Path::new("loosening/run-8.csv.json")]);
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use bowden_core::outcome::Failure;
 use bowden_core::progress::{Progress, Quiet};
-use bowden_core::survey::{self, Plan, RigRule, Store, Surveyed, Task};
+use bowden_core::survey::{self, Interim, Plan, RigRule, Store, Surveyed, Task};
 use pyo3::prelude::*;
 
 use crate::errors::Raise;
@@ -16,6 +17,7 @@ use crate::work::run;
 pub struct NativePlan {
     plan: Plan,
     out: PathBuf,
+    interim: Mutex<Interim>,
 }
 
 /// Recording, its file, bench, rig file.
@@ -32,7 +34,7 @@ impl NativePlan {
             |(below, rig): (String, PathBuf)| RigRule { below: below.trim_matches('/').to_owned(), rig };
         let rules: Vec<RigRule> = rules.into_iter().map(rule).collect();
         let plan = Plan::new(&folder, &rules, &out).or_raise(py)?;
-        Ok(Self { plan, out })
+        Ok(Self { plan, out, interim: Mutex::default() })
     }
 
     fn __len__(&self) -> usize {
@@ -78,10 +80,20 @@ impl NativePlan {
         py.detach(keep).or_raise(py)
     }
 
+    /// Whether tables and page are due while the survey goes on: of `ended` recordings, kept ones among them, `failed` have no result.
+    fn is_due(&self, ended: usize, failed: usize) -> bool {
+        self.interim.lock().unwrap_or_else(PoisonError::into_inner).is_due(ended, failed)
+    }
+
     /// Writes tables and page.
     fn summarise(&self, py: Python<'_>, failed: Failures, left: BTreeSet<String>) -> PyResult<PathBuf> {
         let mut failed = failed;
-        let work = || survey::summarise(&self.plan, &Store::open(&self.out)?, &mut failed, &left);
+        let work = || -> Result<PathBuf, Failure> {
+            let page = survey::summarise(&self.plan, &Store::open(&self.out)?, &mut failed, &left)?;
+            let mut interim = self.interim.lock().unwrap_or_else(PoisonError::into_inner);
+            interim.written(self.plan.tasks.len() - left.len());
+            Ok(page)
+        };
         py.detach(work).or_raise(py)
     }
 }

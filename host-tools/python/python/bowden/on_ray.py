@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from bowden import _bowden
@@ -17,6 +18,9 @@ _RETRIES = 3
 _AHEAD = 4
 """Tasks that are handed to Ray for every processor of the cluster: enough that none waits, few beside 100 000."""
 
+_Task = tuple[str, Path, str, Path | None]
+"""Recording, its file, bench, rig file."""
+
 _Watcher = Callable[[str, int, int], object]
 
 
@@ -26,6 +30,11 @@ def _one(recording: str, path: str, bench: str, rig: str | None) -> tuple[str | 
         return _bowden.survey_one(recording, path, bench, rig), None
     except Error as error:
         return None, error.message
+
+
+def _left(pending: list[_Task], done: set[str], failed: list[tuple[str, str]]) -> set[str]:
+    """Recordings of which nothing is known yet."""
+    return {recording for recording, *_ in pending} - done - {recording for recording, _ in failed}
 
 
 def survey_on_ray(
@@ -69,12 +78,13 @@ def survey_on_ray(
                 else:
                     plan.keep(result)
                     done.add(recording)
+            if plan.is_due(len(plan) - len(pending) + len(done) + len(failed), len(failed)):
+                plan.summarise(failed, _left(pending, done, failed))
             if watcher is not None:
                 watcher("diagnosing recordings", len(done) + len(failed), len(pending))
     except KeyboardInterrupt:
         for reference in running:
             ray.cancel(reference, force=True)
-    ended_names = done | {recording for recording, _ in failed}
-    left = {recording for recording, *_ in pending} - ended_names
+    left = _left(pending, done, failed)
     plan.summarise(failed, left)
     return len(done), len(plan) - len(pending), len(left), failed
