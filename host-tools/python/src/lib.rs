@@ -32,7 +32,7 @@ mod _bowden {
     #[pymodule_export]
     use crate::study::{NativeStudy, fit};
     #[pymodule_export]
-    use crate::survey::{NativePlan, survey_one, survey_page};
+    use crate::survey::{NativePlan, survey_one, survey_page, survey_program};
     #[pymodule_export]
     use crate::work::{replay, simulate};
 }

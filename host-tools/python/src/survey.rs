@@ -116,6 +116,12 @@ fn diagnosed(task: &Task) -> Result<String, Failure> {
     task.diagnose(&Quiet)?.to_json()
 }
 
+/// The program that results are kept under: equal for packages and commands of the same sources.
+#[pyfunction]
+pub fn survey_program() -> &'static str {
+    survey::PROGRAM
+}
+
 /// The page of a survey in its folder.
 #[pyfunction]
 pub fn survey_page(folder: PathBuf) -> PathBuf {

@@ -3,18 +3,29 @@
 import os
 import signal
 import subprocess
+import sys
 import threading
+import time
+import types
 import warnings
+from collections import Counter
 from pathlib import Path
 
 import polars
 import pytest
 
 import bowden
+from bowden import on_ray
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def _messages(survey: Path) -> dict[str, str]:
+    """Recordings of a survey that failed, and why, from its table."""
+    failed = polars.read_parquet(survey / "recordings.parquet").filter(polars.col("status") == "failed")
+    return dict(zip(failed["recording"], failed["message"], strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -92,42 +103,133 @@ def test_what_cannot_be_a_survey_is_refused(folder, tmp_path):
             wrong()
 
 
-def test_a_worker_of_a_cluster_that_dies_loses_nothing(folder, single, tmp_path):
-    ray = pytest.importorskip("ray", reason="skipped: Ray is not installed; pip install ray into the environment of the tests")
-    import psutil
-
-    killed: list[int] = []
-    followed: list[tuple[int, int]] = []
-
-    def kill_one(stage: str, done: int, steps: int) -> None:
-        table = tmp_path / "recordings.parquet"
-        status = polars.read_parquet(table)["status"].to_list() if table.exists() else ["left"] * steps
-        followed.append((done, steps - status.count("left")))
-        # Of this process: another one of the machine may use Ray, too.
-        own = {child.pid for child in psutil.Process().children(recursive=True)}
-        named = [one for one in psutil.process_iter(["cmdline"]) if (one.info["cmdline"] or [""])[0].startswith("ray::_one")]
-        workers = [one for one in named if one.pid in own]
-        if workers and not killed:
-            killed.append(workers[0].pid)
-            workers[0].send_signal(signal.SIGKILL)
-
+@pytest.fixture(scope="module")
+def cluster():
+    """Two workers on this machine for all tests that need them, because Ray starts slowly."""
+    ray = pytest.importorskip("ray", reason="skipped: Ray is not installed; pip install -r requirements.txt into the environment of the tests")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-        try:
-            found = bowden.survey(folder, rig=folder / "bench.toml", out=tmp_path, engine="ray", progress=kill_one)
-        finally:
-            ray.shutdown()
-    assert len(killed) == 1
-    # Without a result nothing is written: the damaged recording may be the first that ends.
-    assert followed in ([(1, 1), (2, 2), (3, 3), (4, 4)], [(1, 0), (2, 2), (3, 3), (4, 4)])
-    assert (found.diagnosed, found.left, list(found.failed)) == (3, 0, ["b/run-9.csv"])
+    yield
+    ray.shutdown()
+
+
+def _survey_on_ray(folder: Path, out: Path, progress: bowden.ProgressLike = False) -> bowden.Survey:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return bowden.survey(folder, rig=folder / "bench.toml", out=out, engine="ray", progress=progress)
+
+
+def test_tables_and_page_follow_while_a_cluster_works(folder, single, cluster, tmp_path):
+    read: list[tuple[int, int, bool]] = []
+
+    def watch(stage: str, done: int, steps: int) -> None:
+        table = tmp_path / "recordings.parquet"
+        status = polars.read_parquet(table)["status"].to_list() if table.exists() else ["left"] * steps
+        read.append((done, steps - status.count("left"), (tmp_path / "survey.html").exists()))
+
+    _survey_on_ray(folder, tmp_path, watch)
+    # Without any result there is nothing to write, and the damaged recording may be the first that ends.
+    assert read[0] in ((1, 1, True), (1, 0, False))
+    assert read[1:] == [(2, 2, True), (3, 3, True), (4, 4, True)]
     assert _contents(tmp_path) == _contents(single)
 
 
-def test_without_ray_the_engine_says_what_to_install(folder, monkeypatch, tmp_path):
-    import sys
+def test_a_worker_of_a_cluster_that_dies_loses_nothing(folder, single, cluster, monkeypatch, tmp_path):
+    attempts = tmp_path / "attempts"
 
+    def _one(recording, *task):
+        from bowden.on_ray import _one as diagnosed
+
+        with attempts.open("a") as file:
+            file.write(f"{recording}\n")
+        if recording == "a/run-0.csv" and attempts.read_text().count(recording) == 1:
+            # While it works, and before the result is handed over.
+            threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGKILL)).start()
+            diagnosed(recording, *task)
+            time.sleep(60)
+        return diagnosed(recording, *task)
+
+    monkeypatch.setattr(on_ray, "_one", _one)
+    found = _survey_on_ray(folder, tmp_path / "out")
+    # First, with the messages: they say why a recording has no result.
+    assert found.failed == _messages(single)
+    assert (found.diagnosed, found.left) == (3, 0)
+    assert found.tables["recordings"].read_bytes() == (single / "recordings.parquet").read_bytes()
+    assert _contents(tmp_path / "out") == _contents(single)
+    begun = Counter(attempts.read_text().split())
+    assert begun["a/run-0.csv"] == 2, "the worker was killed, and its task begun anew"
+    assert set(begun) == {"a/run-0.csv", "a/run-1.csv", "b/run-2.csv", "b/run-9.csv"}
+
+
+def test_a_task_without_a_result_says_whether_workers_crashed_or_what_it_raised(folder, single, cluster, monkeypatch, tmp_path):
+    attempts = tmp_path / "attempts"
+
+    def _one(recording, *task):
+        from bowden.on_ray import _one as diagnosed
+
+        with attempts.open("a") as file:
+            file.write(f"{recording}\n")
+        if recording == "a/run-0.csv":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if recording == "a/run-1.csv":
+            import nowhere_installed  # noqa: F401
+        return diagnosed(recording, *task)
+
+    monkeypatch.setattr(on_ray, "_one", _one)
+    found = _survey_on_ray(folder, tmp_path / "out")
+    assert Counter(attempts.read_text().split()) == {"a/run-0.csv": 4, "a/run-1.csv": 1, "b/run-2.csv": 1, "b/run-9.csv": 1}
+    assert (found.diagnosed, found.left, list(found.failed)) == (1, 0, ["a/run-0.csv", "a/run-1.csv", "b/run-9.csv"])
+    assert found.failed["a/run-0.csv"].startswith(f"{folder / 'a/run-0.csv'}: its worker was lost 4 times (WorkerCrashedError); ")
+    raised = f"{folder / 'a/run-1.csv'}: its task failed on the worker (ModuleNotFoundError: No module named 'nowhere_installed'); "
+    assert found.failed["a/run-1.csv"].startswith(raised)
+    before = polars.read_parquet(single / "recordings.parquet")
+    after = polars.read_parquet(found.tables["recordings"])
+    assert after["status"].to_list() == ["failed", "failed", "done", "failed"]
+    assert after[2:].equals(before[2:])
+
+
+def test_a_package_that_workers_lack_is_named(folder, cluster, monkeypatch, tmp_path):
+    lacking = types.ModuleType("nowhere_installed")
+    exec("def _one(recording, path, bench, rig, program):\n    return None, None\n", lacking.__dict__)
+    monkeypatch.setitem(sys.modules, "nowhere_installed", lacking)
+    monkeypatch.setattr(on_ray, "_one", lacking._one)
+    with pytest.raises(bowden.InputError, match="no recording could be diagnosed; the first: ") as refused:
+        _survey_on_ray(folder, tmp_path)
+    raised = "its task failed on the worker (ModuleNotFoundError: No module named 'nowhere_installed'); correct what is installed there"
+    assert refused.value.message.endswith(raised)
+
+
+class _Panic(BaseException):
+    """As the native part raises where it panics."""
+
+
+def test_a_worker_hands_back_why_there_is_no_result(folder, monkeypatch):
+    program = bowden._bowden.survey_program()
+    damaged = str(folder / "b/run-9.csv")
+    task = ("b/run-9.csv", damaged, "b", str(folder / "bench.toml"))
+    result, reason = on_ray._one(*task, program)
+    assert result is None and reason.startswith(f"{damaged}:3: column `t_s`")
+    result, reason = on_ray._one(*task, "bowden 0.0.1")
+    assert result is None and "another version than that of the caller" in reason
+
+    def raises(error: BaseException) -> None:
+        def survey_one(*task):
+            raise error
+
+        monkeypatch.setattr(bowden._bowden, "survey_one", survey_one)
+
+    raises(_Panic("index out\nof bounds"))
+    assert on_ray._one(*task, program) == (
+        None,
+        f"{damaged}: _Panic: index out of bounds, a fault of bowden and not of the recording; report it with the recording and the rig file",
+    )
+    raises(KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        on_ray._one(*task, program)
+
+
+def test_without_ray_the_engine_says_what_to_install(folder, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(bowden.InputError, match="pip install ray"):
+    with pytest.raises(bowden.InputError, match=r'pip install "bowden\[ray\]"'):
         bowden.survey(folder, rig=folder / "bench.toml", out=tmp_path, engine="ray", progress=False)
