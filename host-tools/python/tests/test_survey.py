@@ -103,13 +103,25 @@ def test_what_cannot_be_a_survey_is_refused(folder, tmp_path):
             wrong()
 
 
+def _start(ray) -> None:
+    """Ray gives itself 30 s to start, which nothing sets otherwise; beside other work the first start on a machine may take longer."""
+    for attempts_left in (2, 1, 0):
+        try:
+            ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+            return
+        except Exception as error:
+            ray.shutdown()
+            if attempts_left == 0 or "timed out during startup" not in str(error):
+                raise
+
+
 @pytest.fixture(scope="module")
 def cluster():
     """Two workers on this machine for all tests that need them, because Ray starts slowly."""
     ray = pytest.importorskip("ray", reason="skipped: Ray is not installed; pip install -r requirements.txt into the environment of the tests")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+        _start(ray)
     yield
     ray.shutdown()
 
