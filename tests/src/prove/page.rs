@@ -26,7 +26,7 @@ pub struct Provenance {
     pub jobs: usize,
     /// Seed of the run.
     pub seed: u64,
-    /// Each which case of every group was run: 1 for all.
+    /// One of so many cases of every group was run; 1 for all.
     pub every: usize,
 }
 
@@ -79,7 +79,7 @@ fn write(
     calibration(page, summary)?;
     by_effect(page, summary)?;
     confusion(page, summary)?;
-    failures(page, summary)
+    failures(page, summary, *seed)
 }
 
 fn groups(page: &mut String, summary: &Summary) -> std::fmt::Result {
@@ -209,13 +209,16 @@ fn confusion(page: &mut String, summary: &Summary) -> std::fmt::Result {
     Ok(())
 }
 
-fn failures(page: &mut String, summary: &Summary) -> std::fmt::Result {
+fn failures(page: &mut String, summary: &Summary, run_seed: u64) -> std::fmt::Result {
     let count = summary.failed().count();
     writeln!(page, "\n## Cases that are not right: {count}\n")?;
     if count == 0 {
         return Ok(());
     }
-    writeln!(page, "`cargo xtask prove --only CASE --out DIR` runs one again and keeps its files.\n")?;
+    writeln!(
+        page,
+        "`cargo xtask prove --seed {run_seed} --only CASE --out DIR` runs one again and keeps its files.\n"
+    )?;
     writeln!(page, "| case | seed | concealed | said | what the files tell |\n|---|---|---|---|---|")?;
     for (outcome, score) in summary.failed() {
         let (name, seed) = (&outcome.name, outcome.seed);
@@ -246,7 +249,7 @@ mod tests {
             tool: "bowden 0.1.0".to_owned(),
             threads: 2,
             jobs: 1,
-            seed: 1,
+            seed: 7,
             every: 2,
         }
     }
@@ -262,10 +265,11 @@ mod tests {
         let page = render(&summary, &[], &provenance());
         for line in [
             "| date | 2026-01-02 |",
-            "| run | seed 1, 1 at a time with 2 threads each, 2 cases, one of 2 of every group |",
+            "| run | seed 7, 1 at a time with 2 threads each, 2 cases, one of 2 of every group |",
             "| single effects: first name right | 0 of 1 (0.0 %) | ≥ 95 % | **missed** |",
             "| nothing or parameters only: false physics | 0 of 1 (0.0 %) | none | met |",
             "| joint_spring | joint_backlash | 1 |",
+            "`cargo xtask prove --seed 7 --only CASE --out DIR` runs one again and keeps its files.",
             "| nothing | nothing | 1 |",
             "| 90 to 97 % | 92.0 % | 0 of 1 (0.0 %) |",
             "## Cases that are not right: 1",

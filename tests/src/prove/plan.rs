@@ -378,32 +378,28 @@ impl Draw {
 #[must_use]
 pub fn quick_sample(plans: Vec<Plan>) -> Vec<Plan> {
     let sizes = Group::ALL.map(|group| plans.iter().filter(|plan| plan.group == group).count());
-    let mut seen = [0; Group::ALL.len()];
-    plans
-        .into_iter()
-        .filter(|plan| {
-            let group = plan.group as usize;
-            let place = seen[group];
-            seen[group] += 1;
-            let (size, wanted) = (sizes[group], plan.group.quick());
-            // One of every `size / wanted`; the remainder of the division moves it through strength and noise.
-            place == 0 || place * wanted / size != (place - 1) * wanted / size
-        })
-        .collect()
+    by_place(plans, |group, place| {
+        let (size, wanted) = (sizes[group as usize], group.quick());
+        // One of every `size / wanted`; the remainder of the division moves it through strength and noise.
+        place == 0 || place * wanted / size != (place - 1) * wanted / size
+    })
 }
 
 /// Each `every`-th case of every group. Effects have four cases each, by strength and noise; from one to the next others of them are taken.
 #[must_use]
 pub fn thinned(plans: Vec<Plan>, every: usize) -> Vec<Plan> {
+    by_place(plans, |_, place| (place + place / 4) % every == 0)
+}
+
+/// The cases that are wanted by group and place in it.
+fn by_place(plans: Vec<Plan>, wanted: impl Fn(Group, usize) -> bool) -> Vec<Plan> {
     let mut seen = [0; Group::ALL.len()];
-    plans
-        .into_iter()
-        .filter(|plan| {
-            let place = seen[plan.group as usize];
-            seen[plan.group as usize] += 1;
-            (place + place / 4) % every == 0
-        })
-        .collect()
+    let is_wanted = |plan: &Plan| {
+        let place = seen[plan.group as usize];
+        seen[plan.group as usize] += 1;
+        wanted(plan.group, place)
+    };
+    plans.into_iter().filter(is_wanted).collect()
 }
 
 /// What the bench of a noise level shows, for the page.
