@@ -71,8 +71,8 @@ def survey_on_ray(
     try:
         import ray
     except ImportError as error:
-        message = 'engine "ray" needs Ray; pip install "bowden[ray]"'
-        raise InputError(message, hint='pip install "bowden[ray]"') from error
+        message = 'engine "ray" needs Ray; pip install ray'
+        raise InputError(message, hint="pip install ray") from error
     if not ray.is_initialized():
         ray.init(include_dashboard=False, log_to_driver=False)
     pending = plan.pending()
