@@ -84,12 +84,28 @@ pub(super) fn law_candidates(
                 continue;
             }
             let starts = ground.starts(law, ActiveEffect { target, ..sized(model, law) });
-            if !starts.is_empty() {
-                found.push(Candidate { starts });
-            }
+            found.extend(
+                apart(law.form(), starts)
+                    .into_iter()
+                    .filter(|starts| !starts.is_empty())
+                    .map(|starts| Candidate { starts }),
+            );
         }
     }
     found
+}
+
+/// Starts that lead to optima of their own. A torque that rises steeply at the ends of the travel is almost one that opposes it with a steep
+/// rise in the middle, because the weight of the load takes up the difference; which of them is better only a fit to convergence shows.
+fn apart(form: Form, starts: Vec<ActiveEffect>) -> [Vec<ActiveEffect>; 2] {
+    if form != Form::Power {
+        return [starts, Vec::new()];
+    }
+    let is_steepest_in_the_middle = |start: &ActiveEffect| {
+        start.descriptor().index_of("exponent").is_some_and(|index| start.parameters[index] < 1.0)
+    };
+    let (below, above) = starts.into_iter().partition(is_steepest_in_the_middle);
+    [above, below]
 }
 
 impl Ground<'_> {

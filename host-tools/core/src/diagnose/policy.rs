@@ -86,6 +86,13 @@ impl Policy {
         before - after > least && self.pays(before, after) && after <= self.much_left
     }
 
+    /// The same for a law: it must reduce the loss by the same share as overall, and by what is enough for a named effect. Drag acts most at
+    /// the highest speeds, so that its absolute reduction is smaller without the seconds in which these occur.
+    #[must_use]
+    pub fn law_shows_elsewhere(&self, before: f64, after: f64) -> bool {
+        before - after > self.name_loss && before - after > self.law_share * before
+    }
+
     /// Whether `instances` further instances of a named effect, such as harmonics of cogging, are kept.
     #[must_use]
     pub fn worth_having(&self, before: f64, after: f64, instances: usize) -> bool {
@@ -203,6 +210,16 @@ mod tests {
         }
         for begins_at_a_moment in [false, true] {
             assert_eq!(POLICY.shows_elsewhere(0.5, 0.42, begins_at_a_moment), !begins_at_a_moment);
+        }
+    }
+
+    /// Drag of a motor, without the tenth of the seconds in which it takes most off: 0.19 of 0.41. A shape that fits one moment takes off a
+    /// large part of that and hardly anything elsewhere.
+    #[test]
+    fn a_law_shows_elsewhere_by_the_same_share() {
+        assert!(!POLICY.worth_stating(0.41, 0.21) && POLICY.law_shows_elsewhere(0.41, 0.21));
+        for (before, after) in [(0.41, 0.32), (0.3, 0.205), (3.0, 2.2), (1.0, 1.1)] {
+            assert!(!POLICY.law_shows_elsewhere(before, after), "{before} to {after}");
         }
     }
 

@@ -15,6 +15,7 @@ mod laws;
 mod loudest;
 mod own_channel;
 mod repeating;
+mod rival_laws;
 mod trying;
 
 use std::cmp::Ordering;
@@ -106,6 +107,13 @@ impl Chosen {
             model.effects.iter_mut().filter(|one| one.is_beside(&self.effect)).for_each(|one| *one = other);
         }
         self.effect = other;
+    }
+
+    /// Odds of a rival against this effect. Effects of the catalogue have higher prior odds than laws ([`handicap`]).
+    pub fn odds_of(&self, rival: &Tried) -> f64 {
+        let is_law = law::of(&rival.effect).is_some();
+        let prior = if is_law { handicap(&rival.effect) / handicap(&self.effect) } else { 1.0 };
+        POLICY.odds(prior * rival.loss / self.loss_after)
     }
 
     /// Updates the losses to those with all other effects present; rivals keep their odds.
@@ -209,6 +217,7 @@ pub fn select(
         search.add_names(&mut present, &mut chosen, &mut rounds)?;
     }
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
+    search.compare_with_laws(&mut present, &mut chosen, &mut rounds)?;
     let trials = search.trials(&nothing)?;
     // An effect that was selected as well is not a rival.
     let found: Vec<ActiveEffect> = chosen.iter().map(|one| one.effect).collect();
@@ -304,12 +313,17 @@ impl Fitted {
     }
 
     /// Whether `effect`, which `before` lacks, reaches the threshold `worth`, and is visible also without the data that support it most: an
-    /// effect of the catalogue at all, a law by the same threshold, because one of its many forms can fit a few moments by chance.
+    /// effect of the catalogue at all, a law by the same share, because one of its many forms can fit a few moments by chance.
     fn shows(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
         let is_law = law::of(effect).is_some();
         let begins_at_a_moment = moment_of(effect).is_some();
         let elsewhere = |[without, with]: &[f64; 2]| {
-            worth(*without, *with) || !is_law && POLICY.shows_elsewhere(*without, *with, begins_at_a_moment)
+            worth(*without, *with)
+                || if is_law {
+                    POLICY.law_shows_elsewhere(*without, *with)
+                } else {
+                    POLICY.shows_elsewhere(*without, *with, begins_at_a_moment)
+                }
         };
         let quieter = without_the_loudest(&before.stretch_losses, &self.stretch_losses);
         worth(before.loss, self.loss) && quieter.iter().all(elsewhere)
@@ -537,11 +551,12 @@ fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffec
     Some(other)
 }
 
-/// Factor on the loss of a candidate in comparisons.
+/// Factor on the loss of a candidate in comparisons: effects of the catalogue in their usual form are more likely than others.
 fn handicap(effect: &ActiveEffect) -> f64 {
     let parameters = effect.descriptor().parameters;
     let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
-    POLICY.handicap(parameters.len(), !parameters.iter().zip(effect.parameters).any(unusual))
+    let is_unusual = law::of(effect).is_some() || parameters.iter().zip(effect.parameters).any(unusual);
+    POLICY.handicap(parameters.len(), !is_unusual)
 }
 
 /// Whether a fitted effect is negligible: too weak, within the tolerances of an ordinary bench, or active over too little travel.

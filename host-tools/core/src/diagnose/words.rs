@@ -24,7 +24,7 @@ pub(super) fn rivals(
         .others
         .iter()
         .filter(|tried| tried.effect.descriptor().id != own_id)
-        .map(|tried| (tried, POLICY.odds(tried.loss / chosen.loss_after)))
+        .map(|tried| (tried, chosen.odds_of(tried)))
         .collect();
     let sum: f64 = 1.0 + odds.iter().map(|(_, odds)| odds).sum::<f64>();
     let present = POLICY.presence(improvement);

@@ -13,7 +13,7 @@ use crate::outcome::Failure;
 const MOST_LAWS: usize = 2;
 
 /// Minimum estimated reduction of the loss by a law, relative to that of the effects it would replace, for it to be fitted.
-const RIVALLING: f64 = 0.5;
+pub(super) const RIVALLING: f64 = 0.5;
 
 impl Search<'_> {
     /// Replaces all named effects, or all but the first, by one law that predicts clearly better, and returns whether it did. Against one
@@ -90,13 +90,15 @@ impl Search<'_> {
             chosen.push(found);
             *present = with;
             self.prune(present, chosen)?;
+            // Beside the law an effect may show that is worth little without it.
+            self.add_names(present, chosen, rounds)?;
         }
         Ok(())
     }
 }
 
 /// Whether both change the reading of the same sensor, so that their losses differ in its channel alone.
-fn are_of_one_sensor(one: &ActiveEffect, other: &ActiveEffect) -> bool {
+pub(super) fn are_of_one_sensor(one: &ActiveEffect, other: &ActiveEffect) -> bool {
     let of_sensor = |effect: &ActiveEffect| effect.descriptor().component == Component::Sensors;
     of_sensor(one) && of_sensor(other) && one.target.overlaps(other.target)
 }
