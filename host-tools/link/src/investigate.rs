@@ -303,6 +303,7 @@ mod tests {
             let words = "a slow sine".to_owned();
             diagnosis.effects[0].rivals.push(Rival {
                 id: (*rival).to_owned(),
+                formula: None,
                 probability: 0.4,
                 separating_experiment: words.clone(),
             });

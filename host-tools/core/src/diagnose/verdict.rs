@@ -37,11 +37,14 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
-/// An effect that could not be excluded beside the named one.
+/// An effect or a law of the same component that could not be excluded beside the named one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rival {
     /// Identifier.
     pub id: String,
+    /// Formula of a law; `None` for an effect of the catalogue.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub formula: Option<String>,
     /// Probability that this is the one.
     pub probability: f64,
     /// What to record so that the two part.

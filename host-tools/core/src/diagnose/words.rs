@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use bowden_model::effect::{ActiveEffect, Component, ParameterSpec};
+use bowden_model::law;
 
 use super::policy::POLICY;
 use super::selection::{Chosen, Tried};
@@ -35,6 +36,7 @@ pub(super) fn rivals(
             let general = || experiment(&tried.effect).to_owned();
             rivals.push(Rival {
                 id: descriptor.id.to_owned(),
+                formula: law::of(&tried.effect).map(|law| law.formula().to_owned()),
                 probability: present * odds / sum,
                 separating_experiment: separate(tried).unwrap_or_else(general),
             });

@@ -59,6 +59,7 @@ fn diagnosis() -> Diagnosis {
                 .into(),
         rivals: vec![Rival {
             id: "friction_drift".into(),
+            formula: None,
             probability: 0.0003,
             separating_experiment:
                 "repeat the triangle after the sheath has been left alone for ten minutes.".into(),
@@ -90,6 +91,7 @@ fn diagnosis() -> Diagnosis {
         sentence: "The sensor of f4_n reads too high by a constant.".into(),
         rivals: vec![Rival {
             id: "asymmetric_friction".into(),
+            formula: None,
             probability: 0.11,
             separating_experiment: "hold still with both tendons slack and read all four sensors.".into(),
         }],

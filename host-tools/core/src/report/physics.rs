@@ -74,7 +74,8 @@ pub fn card(effect: &NamedEffect) -> Markup {
             @if !effect.rivals.is_empty() {
                 h4 { "Not excluded" }
                 ul.rivals { @for rival in &effect.rivals { li {
-                    strong { (names::words(&rival.id)) } " " code { (rival.id) } ", " (figures::share(rival.probability))
+                    strong { (names::words(&rival.id)) } " " code { (rival.formula.as_ref().unwrap_or(&rival.id)) } ", "
+                    (figures::share(rival.probability))
                     ". To tell them apart: " (rival.separating_experiment)
                 } } }
             }

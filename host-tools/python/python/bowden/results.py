@@ -53,12 +53,14 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect that could not be excluded beside the named one."""
+    """An effect or a law of the same component that could not be excluded beside the named one."""
 
     id: str
     probability: float
     separating_experiment: str
     """What to record so that the two part."""
+    formula: str | None = None
+    """Formula of a law; `None` for an effect of the catalogue."""
 
 
 @dataclass(frozen=True)

@@ -131,3 +131,143 @@ fn can_replace(candidate: &Candidate, named: &ActiveEffect) -> bool {
 fn names_at<'c>(places: &'c [usize], chosen: &'c [Chosen]) -> impl Iterator<Item = &'c Chosen> {
     places.iter().filter(|place| !is_further(chosen, **place)).map(|place| &chosen[*place])
 }
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effect::Target;
+    use bowden_model::effects;
+
+    use super::*;
+    use crate::diagnose::hypotheses::Asked;
+    use crate::diagnose::layout::Layout;
+    use crate::fit::objective::Objective;
+    use crate::joint_model::JointModel;
+    use crate::progress::Quiet;
+    use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
+
+    fn named(id: &str) -> ActiveEffect {
+        ActiveEffect::with_defaults(effects::find(id).expect("an effect of this name"))
+    }
+
+    fn stated(id: &str) -> ActiveEffect {
+        ActiveEffect::with_defaults(law::find(id).expect("a law of this name"))
+    }
+
+    fn of_f2(effect: ActiveEffect) -> ActiveEffect {
+        ActiveEffect { target: Target::One(Channel::F2), ..effect }
+    }
+
+    fn chosen(effect: ActiveEffect, fitted: &Fitted, nothing: &Fitted) -> Chosen {
+        Chosen {
+            effect,
+            model: fitted.without_ordinary(),
+            loss_before: nothing.loss,
+            loss_after: fitted.loss,
+            compared: [nothing, fitted].map(|fitted| fitted.solution.model.clone()),
+            others: Vec::new(),
+        }
+    }
+
+    /// What is left of these named effects on a bench whose physics is `real`.
+    fn compared(real: ActiveEffect, names: &[ActiveEffect]) -> Vec<Chosen> {
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let with_real = JointModel { effects: vec![real], ..model.clone() };
+        let measured = replay(&with_real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let asked = Asked::default();
+        let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
+        let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let start = (nothing.layout.clone(), nothing.solution.model.clone());
+        let (layout, with) = names.iter().fold(start, |(layout, model), name| layout.with(&model, *name));
+        let mut present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let mut found: Vec<Chosen> = present.solution.model.effects[present.layout.first_found()..]
+            .iter()
+            .map(|effect| chosen(*effect, &present, &nothing))
+            .collect();
+        search.compare_with_laws(&mut present, &mut found, &mut Vec::new()).unwrap();
+        assert_eq!(found.len(), present.solution.model.effects.len() - present.layout.first_found());
+        found
+    }
+
+    /// 0.01 of the square of a tension between 20 and 40 N, of which a straight line leaves up to 0.5 N.
+    #[test]
+    fn a_gain_and_an_offset_that_imitate_a_curved_sensor_give_way_to_it() {
+        let curved = of_f2(stated("law_reading_is_curved").with("curvature", 0.01));
+        let left = compared(curved, &[of_f2(named("sensor_gain_error")), of_f2(named("sensor_offset"))]);
+        let [law] = &left[..] else { panic!("{:?}", left.iter().map(|one| one.effect).collect::<Vec<_>>()) };
+        assert_eq!(law.effect.descriptor().id, "law_reading_is_curved");
+        let curvature = law.effect.parameters[0];
+        assert!((curvature / 0.01 - 1.0).abs() < 0.05, "{curvature}");
+    }
+
+    #[test]
+    fn an_offset_stays_one() {
+        let offset = of_f2(named("sensor_offset").with("offset", 2.0));
+        let left = compared(offset, &[of_f2(named("sensor_offset"))]);
+        let [name] = &left[..] else { panic!("{:?}", left.iter().map(|one| one.effect).collect::<Vec<_>>()) };
+        assert_eq!(name.effect.descriptor().id, "sensor_offset");
+        assert!((name.effect.parameters[0] - 2.0).abs() < 0.02, "{:?}", name.effect);
+    }
+
+    /// By hand, for one parameter against two at equal losses: (1.06 / 0.85 / 1.03)^-10 = 0.148; against a further effect 1.
+    #[test]
+    fn a_law_has_lower_prior_odds_than_a_name() {
+        let recording = test_bench::swung(2);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let effect = named("joint_viscous_friction");
+        let chosen = Chosen {
+            effect,
+            model: model.clone(),
+            loss_before: 2.0,
+            loss_after: 1.0,
+            compared: [model.clone(), model.clone()],
+            others: Vec::new(),
+        };
+        let rival = |effect, loss| Tried { effect, model: model.clone(), loss };
+        let law = chosen.odds_of(&rival(stated("law_joint_friction_by_speed"), 1.0));
+        assert!((law - 0.1477).abs() < 1e-3, "{law}");
+        assert_eq!(chosen.odds_of(&rival(named("joint_coulomb_friction"), 1.0)), 1.0);
+        // 0.8 of the loss: 0.8^-10 = 9.3 times the odds.
+        let better = chosen.odds_of(&rival(stated("law_joint_friction_by_speed"), 0.8));
+        assert!((better / law - 9.313).abs() < 1e-2, "{better}");
+    }
+
+    #[test]
+    fn effects_of_one_sensor_and_of_one_part_are_compared_together_and_alone() {
+        let recording = test_bench::swung(2);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let one = |effect| Chosen {
+            effect,
+            model: model.clone(),
+            loss_before: 2.0,
+            loss_after: 1.0,
+            compared: [model.clone(), model.clone()],
+            others: Vec::new(),
+        };
+        let of_f4 = |effect| ActiveEffect { target: Target::One(Channel::F4), ..effect };
+        let [gain, offset] = ["sensor_gain_error", "sensor_offset"].map(|id| of_f2(named(id)));
+        let other = of_f4(named("sensor_offset"));
+        let [dry, spring] = ["joint_coulomb_friction", "joint_spring"].map(named);
+        let [cogging, harmonic] = [8.0, 16.0].map(|n| named("motor_cogging").with("cycles_per_turn", n));
+        let law = stated("law_joint_friction_at_a_place");
+        let all: Vec<Chosen> =
+            [gain, dry, other, cogging, law, offset, harmonic, spring].map(one).into_iter().collect();
+        let expected = [
+            vec![gain, offset],
+            vec![dry, spring],
+            vec![gain],
+            vec![dry],
+            vec![other],
+            vec![cogging, harmonic],
+            vec![offset],
+            vec![spring],
+        ];
+        assert_eq!(imitators(&all), expected);
+    }
+}
