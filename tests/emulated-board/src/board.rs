@@ -36,6 +36,7 @@ pub struct BoardBuilder<'a> {
     parameter_pages: Option<Vec<u8>>,
     /// Two banks of flash, brown-out level.
     options: (bool, u8),
+    count_accesses: bool,
 }
 
 impl BoardBuilder<'_> {
@@ -77,6 +78,14 @@ impl BoardBuilder<'_> {
         self
     }
 
+    /// Counts fetches, loads and stores by memory, for the upper bound of the cycles in [`Measurement::worst`]. Virtual time is the
+    /// same; the emulation takes about twice as long.
+    #[must_use]
+    pub fn count_accesses(mut self) -> Self {
+        self.count_accesses = true;
+        self
+    }
+
     /// Content of the last 16 KiB of flash, as [`Board::flash_image`] gave it; the default is erased.
     #[must_use]
     pub fn flash_image(mut self, content: &[u8]) -> Self {
@@ -105,7 +114,11 @@ impl BoardBuilder<'_> {
             bus.flash.set_content(&content);
         }
         bus.trace.watch(TICK_MARKER);
-        Ok(Board { cpu: Cpu::new(image, bus, rtt)?, injected: Vec::new() })
+        let mut cpu = Cpu::new(image, bus, rtt)?;
+        if self.count_accesses {
+            cpu.count_accesses()?;
+        }
+        Ok(Board { cpu, injected: Vec::new() })
     }
 }
 
@@ -188,6 +201,7 @@ impl Board {
             motor_reversed: false,
             parameter_pages: None,
             options: (true, 0),
+            count_accesses: false,
         }
     }
 
@@ -627,6 +641,17 @@ impl Board {
             .flash_blocks()
             .map(|address| format!("{} ({address:#010x})", machine.image.function_at(address)))
             .collect()
+    }
+
+    /// What calls of the functions measured read from the flash since counting started over: static or function that holds the word,
+    /// its address, and the function that read it. Only where [`BoardBuilder::count_accesses`] was asked for.
+    pub fn read_from_flash(&self) -> Vec<String> {
+        let machine = self.cpu.machine();
+        let reads = machine.measure.flash_reads().map(|(address, block)| {
+            let (holder, reader) = (machine.image.symbol_at(address), machine.image.function_at(block));
+            format!("{holder} ({address:#010x}), read by {reader}")
+        });
+        reads.collect()
     }
 
     /// Timing of the control tick since the start, or since its edges were taken out; `None` before two ticks.

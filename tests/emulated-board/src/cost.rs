@@ -1,14 +1,34 @@
-//! Lower bound of the cycles of a basic block on a Cortex-M4F.
+//! Lower and upper bound of the cycles of a basic block on a Cortex-M4F, waits for memories left aside.
+//!
+//! # Lower bound
 //!
 //! Counts per instruction are those of the Cortex-M4 technical reference manual (tables of processor and FPU
 //! instruction timing), each taken at its smallest: pipeline refill P = 1, divisions 2, a load directly behind another
 //! load or store 1, instructions inside an IT block 1 (they may be skipped). Flash wait states, bus contention, cache
 //! misses and lazy FP stacking are not counted. Every instruction costs at least one cycle.
+//!
+//! # Upper bound
+//!
+//! The same tables, each at its largest: pipeline refill P = 3, divisions 12, no load pipelined behind another, instructions inside
+//! an IT block at their full count. Added to them: a cycle for each load and store whose address the instruction before may have
+//! computed, a cycle for each FP operation whose operand the instruction before may have computed, and a cycle for each 32-bit
+//! instruction that straddles two words of a fetch. What memories add: [`crate::accesses`].
 
-/// Cycles to refill the pipeline after a branch, at least.
+/// Cycles to refill the pipeline after a branch, at least and at most (Cortex-M4 TRM, 3.3.1: 1 to 3).
 const REFILL: u32 = 1;
-/// SDIV and UDIV, at least (2 to 12).
+const MOST_REFILL: u32 = 3;
+/// SDIV and UDIV, at least and at most (TRM, 3.3.1: 2 to 12).
 const DIVISION: u32 = 2;
+const MOST_DIVISION: u32 = 12;
+/// MLA and MLS, at most (TRM, 3.3.1).
+const MOST_MULTIPLY_ACCUMULATE: u32 = 2;
+/// MSR, MRS, CPS and barriers, at most: a barrier refills the pipeline (TRM, 3.3.1: 1 + B, an ISB at least P). The stores that it
+/// waits for are counted where they are made.
+const MOST_SYSTEM: u32 = 1 + MOST_REFILL;
+/// Stall of a load or store whose address the instruction before computed (Cortex-M3 TRM r2p0, 3.3.2; Cortex-M4 TRM, 3.3.2).
+const ADDRESS_STALL: u32 = 1;
+/// Stall of an FP operation that waits for the one before (Cortex-M4 TRM, 7.2.3).
+const FP_STALL: u32 = 1;
 /// VDIV.F32 and VSQRT.F32.
 const FP_DIVISION: u32 = 14;
 /// VMLA, VMLS, VFMA and their negated forms.
@@ -126,6 +146,32 @@ fn classify_fp(first: u16, second: u16) -> Class {
     }
 }
 
+/// Largest cycles of the instruction with halfwords `first` and `second`, a branch that may fall through as if it did.
+fn most_cycles(class: Class, first: u16, second: u16) -> u32 {
+    let wide = first >> 11 >= 0b11101;
+    match class {
+        Class::Load | Class::StoreIndexed => 2 + ADDRESS_STALL,
+        Class::Store => 1 + ADDRESS_STALL,
+        // Those of more than a cycle load the program counter.
+        Class::Branch(1) => 1 + MOST_REFILL,
+        Class::Branch(cycles) => cycles + ADDRESS_STALL + MOST_REFILL,
+        Class::ConditionalBranch | Class::IfThen(_) => 1,
+        // PUSH, POP, LDM, STM
+        Class::Plain(cycles) if !wide && cycles > 1 => cycles + ADDRESS_STALL,
+        Class::Plain(_) if !wide && first & 0xffe8 == 0xb660 => MOST_SYSTEM, // CPS
+        Class::Plain(cycles) if !wide => cycles,
+        // LDM, STM, LDRD, STRD, exclusives, VLDR, VSTR, VLDM, VSTM
+        Class::Plain(cycles) if first & 0xfe00 == 0xe800 || first & 0xee00 == 0xec00 => {
+            cycles + ADDRESS_STALL
+        }
+        Class::Plain(cycles) if first & 0xef00 == 0xee00 => cycles + FP_STALL,
+        Class::Plain(DIVISION) => MOST_DIVISION,
+        Class::Plain(_) if first & 0xf800 == 0xf000 && second & 0x8000 != 0 => MOST_SYSTEM,
+        Class::Plain(_) if first & 0xfff0 == 0xfb00 && second & 0xf000 != 0xf000 => MOST_MULTIPLY_ACCUMULATE,
+        Class::Plain(cycles) => cycles,
+    }
+}
+
 /// Cost of a basic block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct BlockCost {
@@ -133,20 +179,26 @@ pub(crate) struct BlockCost {
     pub instructions: u32,
     /// Cycles if its last branch, when conditional, is not taken.
     pub cycles: u32,
-    /// Whether it ends in a conditional branch, which costs [`TAKEN`] more when taken.
+    /// Upper bound of them.
+    pub most_cycles: u32,
+    /// Whether it ends in a conditional branch, which costs [`TAKEN`] and at most [`MOST_TAKEN`] more when taken.
     pub conditional: bool,
 }
 
 /// Extra cycles of a conditional branch that is taken.
 pub(crate) const TAKEN: u32 = REFILL;
+/// Upper bound of them.
+pub(crate) const MOST_TAKEN: u32 = MOST_REFILL;
 
-/// Cost of the straight-line `code`.
-pub(crate) fn block_cost(code: &[u8]) -> BlockCost {
+/// Cost of the straight-line `code` at `address`.
+pub(crate) fn block_cost(address: u32, code: &[u8]) -> BlockCost {
     let half = |at: usize| code.get(at..at + 2).map_or(0, |b| u16::from_le_bytes([b[0], b[1]]));
     let mut cost = BlockCost::default();
     let (mut at, mut in_it, mut behind_transfer) = (0, 0_u32, false);
     while at < code.len() {
-        let (length, class) = classify(half(at), half(at + 2));
+        let (first, second) = (half(at), half(at + 2));
+        let (length, class) = classify(first, second);
+        let straddles = length == 4 && (address as usize + at) % 4 != 0;
         at += length as usize;
         let single = matches!(class, Class::Load | Class::StoreIndexed | Class::Store);
         let cycles = match class {
@@ -157,8 +209,10 @@ pub(crate) fn block_cost(code: &[u8]) -> BlockCost {
             Class::Branch(cycles) => cycles + REFILL,
         };
         // A branch inside an IT block is conditional too.
-        cost.conditional =
-            class == Class::ConditionalBranch || (in_it > 0 && matches!(class, Class::Branch(_)));
+        let may_branch = in_it > 0 && matches!(class, Class::Branch(_));
+        cost.conditional = class == Class::ConditionalBranch || may_branch;
+        cost.most_cycles += most_cycles(class, first, second) + u32::from(straddles)
+            - if may_branch { MOST_TAKEN } else { 0 };
         in_it = if let Class::IfThen(covered) = class { covered } else { in_it.saturating_sub(1) };
         behind_transfer = single;
         cost.instructions += 1;
@@ -174,8 +228,48 @@ mod tests {
 
     fn cost(halfwords: &[u16]) -> (u32, u32, bool) {
         let code: Vec<u8> = halfwords.iter().flat_map(|half| half.to_le_bytes()).collect();
-        let BlockCost { instructions, cycles, conditional } = block_cost(&code);
+        let BlockCost { instructions, cycles, conditional, .. } = block_cost(0x1000_0000, &code);
         (instructions, cycles, conditional)
+    }
+
+    /// Upper bound of the block at `address`.
+    fn most(address: u32, halfwords: &[u16]) -> u32 {
+        let code: Vec<u8> = halfwords.iter().flat_map(|half| half.to_le_bytes()).collect();
+        block_cost(address, &code).most_cycles
+    }
+
+    /// Each instruction at its largest count of the Cortex-M4 manual, with its stalls, added by hand.
+    #[test]
+    fn upper_bounds_are_the_largest_counts_of_the_manual() {
+        let at = 0x1000_0000;
+        assert_eq!(most(at, &[0x1840]), 1, "ADDS");
+        assert_eq!(most(at, &[0x6808, 0x6849]), 6, "LDR, LDR: 2 x (2 + address)");
+        assert_eq!(most(at, &[0x6008]), 2, "STR immediate: 1 + address");
+        assert_eq!(most(at, &[0x5088]), 3, "STR register: 2 + address");
+        assert_eq!(most(at, &[0xb5f0]), 7, "PUSH {{r4-r7, lr}}: 1 + 5 + address");
+        assert_eq!(most(at, &[0xbdf0]), 11, "POP {{r4-r7, pc}}: 1 + 5 + 1 + address + 3");
+        assert_eq!(most(at, &[0xe92d, 0x4ff0]), 11, "PUSH.W {{r4-r11, lr}}: 1 + 9 + address");
+        assert_eq!(most(at + 2, &[0xe92d, 0x4ff0]), 12, "the same across two words");
+        assert_eq!(most(at, &[0x1840, 0xe92d, 0x4ff0]), 13, "ADDS and the same across two words");
+        assert_eq!(most(at, &[0xe9d0, 0x1200]), 4, "LDRD: 1 + 2 + address");
+        assert_eq!(most(at, &[0xd0fe]), 1, "BEQ that falls through");
+        assert_eq!(most(at, &[0xe7fe]), 4, "B: 1 + 3");
+        assert_eq!(most(at, &[0xf000, 0xf800]), 4, "BL: 1 + 3");
+        assert_eq!(most(at, &[0xe8df, 0xf000]), 6, "TBB: 2 + address + 3");
+        assert_eq!(most(at, &[0xfb90, 0xf0f1]), 12, "SDIV");
+        assert_eq!(most(at, &[0xfbb0, 0xf0f1]), 12, "UDIV");
+        assert_eq!(most(at, &[0xfb00, 0x3001]), 2, "MLA");
+        assert_eq!(most(at, &[0xfb00, 0xf001]), 1, "MUL");
+        assert_eq!(most(at, &[0xfb80, 0x0102]), 1, "SMULL");
+        assert_eq!(most(at, &[0xf3bf, 0x8f6f]), 4, "ISB: 1 + 3");
+        assert_eq!(most(at, &[0xb672]), 4, "CPSID");
+        assert_eq!(most(at, &[0xee30, 0x0a20]), 2, "VADD.F32: 1 + stall");
+        assert_eq!(most(at, &[0xee80, 0x0a20]), 15, "VDIV.F32: 14 + stall");
+        assert_eq!(most(at, &[0xed90, 0x0a00]), 3, "VLDR.32: 2 + address");
+        // ITE EQ; LDREQ; LDRNE; LDR: 1 + 3 + 3 + 3.
+        assert_eq!(most(at, &[0xbf0c, 0x6808, 0x6808, 0x6808]), 10);
+        // IT EQ; BXEQ LR, the refill being that of a branch that is taken.
+        assert_eq!(most(at, &[0xbf08, 0x4770]) + MOST_TAKEN, 1 + 1 + 3);
     }
 
     /// Encodings from the ARMv7-M architecture manual, cycles from the Cortex-M4 manual, added by hand.

@@ -5,6 +5,7 @@
 
 use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM as R, Unicorn};
 
+use crate::accesses::Accesses;
 use crate::bus::Bus;
 use crate::elf::Image;
 use crate::error::BoardError;
@@ -94,6 +95,16 @@ impl Cpu {
     /// The log.
     pub(crate) fn rtt_mut(&mut self) -> Option<&mut Rtt> {
         self.rtt.as_mut()
+    }
+
+    /// Counts fetches, loads and stores from now on.
+    pub(crate) fn count_accesses(&mut self) -> Result<(), BoardError> {
+        self.uc.add_mem_hook(HookType::MEM_READ | HookType::MEM_WRITE, 1, 0, |uc, _, address, size, _| {
+            uc.get_data_mut().count_access(address as u32, size as u32);
+            true
+        })?;
+        self.machine_mut().accesses = Some(Accesses::default());
+        Ok(())
     }
 
     /// Number of times the firmware was started.

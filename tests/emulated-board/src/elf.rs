@@ -142,15 +142,23 @@ impl Image {
 
     /// Name of the function that holds `address`.
     pub(crate) fn function_at(&self, address: u32) -> String {
-        let address = address & !1;
-        let after = self.functions.partition_point(|function| function.address <= address);
-        self.functions[..after]
-            .iter()
-            .rev()
-            .take(4)
-            .find(|function| address < function.address + function.size)
-            .map_or_else(|| "no symbol".to_owned(), |function| function.name.clone())
+        find(&self.functions, address & !1).map_or_else(|| NO_SYMBOL.to_owned(), |function| function.name.clone())
     }
+
+    /// Name of the static, else of the function, that holds `address`.
+    pub(crate) fn symbol_at(&self, address: u32) -> String {
+        let holder = find(&self.statics, address).or_else(|| find(&self.functions, address));
+        holder.map_or_else(|| NO_SYMBOL.to_owned(), |symbol| symbol.name.clone())
+    }
+}
+
+/// Stands for the name where no symbol holds an address.
+const NO_SYMBOL: &str = "no symbol";
+
+/// The symbol of `list`, which is in the order of addresses, that holds `address`.
+fn find(list: &[Symbol], address: u32) -> Option<&Symbol> {
+    let after = list.partition_point(|symbol| symbol.address <= address);
+    list[..after].iter().rev().take(4).find(|symbol| address < symbol.address + symbol.size)
 }
 
 /// Symbols of `kind` with a size, by address.

@@ -8,7 +8,8 @@
 //! # Time
 //! Virtual time counts cycles of the core clock. A basic block costs the sum of its instructions' cycles by the
 //! Cortex-M4 manual, each taken at its smallest; flash wait states, bus contention and lazy FP stacking are left out, so
-//! cycles are a lower bound and instructions are exact. Interrupts are taken and accesses to registers are timed at the
+//! cycles are a lower bound and instructions are exact. [`BoardBuilder::count_accesses`] adds an upper bound, with all of these at
+//! their worst: [`WorstCall`], [`accesses`]. Interrupts are taken and accesses to registers are timed at the
 //! borders of basic blocks. Everything is deterministic: equal ELF, seed and calls give an equal
 //! [`Board::trace_hash`].
 //!
@@ -31,6 +32,7 @@
 // Register fields read best as masks and shifts, each register in its own match arm, in the order of their offsets.
 #![allow(clippy::verbose_bit_mask, clippy::match_same_arms)]
 
+pub mod accesses;
 mod analog;
 mod board;
 mod bus;
@@ -61,7 +63,7 @@ pub use encoders::{COUNTS_PER_TURN, EncoderMounting, EncoderPart};
 pub use error::BoardError;
 pub use faults::{Altered, BridgeEvents, Cable, EncoderAt, Injection, Peaks, Rail, TensionAt};
 pub use machine::Counters;
-pub use measure::{Measurement, Spread};
+pub use measure::{Measurement, Spread, WorstCall};
 pub use peripherals::flash::Torn;
 pub use peripherals::rcc::ResetCause;
 pub use pty::Terminal;

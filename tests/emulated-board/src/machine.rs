@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
+use crate::accesses::{Accesses, Fetches};
 use crate::bus::Bus;
-use crate::cost::{BlockCost, TAKEN, block_cost};
+use crate::cost::{BlockCost, MOST_TAKEN, TAKEN, block_cost};
 use crate::elf::Image;
 use crate::error::{BoardError, Refusal};
 use crate::measure::{Measure, Moment};
@@ -41,6 +42,7 @@ pub(crate) enum Trap {
 struct Cached {
     bytes: u32,
     cost: BlockCost,
+    fetches: Fetches,
 }
 
 /// Counters of a run.
@@ -77,6 +79,9 @@ pub(crate) struct Machine {
     pub block: u32,
     block_end: u32,
     block_cost: BlockCost,
+    block_fetches: Fetches,
+    /// What the upper bound is made of, if it is counted.
+    pub accesses: Option<Accesses>,
     /// First cycle at which something is due.
     pub next_event: u64,
     /// Cycle at which the caller wants to stop.
@@ -125,6 +130,8 @@ impl Machine {
             block: 0,
             block_end: 0,
             block_cost: BlockCost::default(),
+            block_fetches: Fetches::default(),
+            accesses: None,
             next_event: 0,
             limit: 0,
             first: false,
@@ -148,7 +155,7 @@ impl Machine {
 
     /// Counters now.
     pub(crate) fn moment(&self) -> Moment {
-        Moment { instructions: self.instructions, cycles: self.cycle }
+        Moment { instructions: self.instructions, cycles: self.cycle, accesses: self.accesses }
     }
 
     /// Counts the block that ran as done, the next one being at `next`.
@@ -156,15 +163,21 @@ impl Machine {
         let cost = self.block_cost;
         self.instructions += u64::from(cost.instructions);
         self.cycle += u64::from(cost.cycles);
-        if cost.conditional && next != self.block_end {
+        let taken = cost.conditional && next != self.block_end;
+        if taken {
             self.cycle += u64::from(TAKEN);
+        }
+        if let Some(accesses) = &mut self.accesses {
+            accesses.fetch(self.block_fetches);
+            accesses.core_cycles += u64::from(cost.most_cycles + if taken { MOST_TAKEN } else { 0 });
+            self.block_fetches = Fetches::default();
         }
         self.block_cost = BlockCost::default();
     }
 
     /// The block that runs ends early: only `done` of its code was executed.
     pub(crate) fn cut_block(&mut self, done: &[u8]) {
-        self.block_cost = block_cost(done);
+        self.block_cost = block_cost(self.block, done);
     }
 
     fn cached(&mut self, address: u32) -> &mut Cached {
@@ -177,19 +190,21 @@ impl Machine {
 
     /// Takes note of a block of `bytes` at `address`; false if its cost is not known yet.
     pub(crate) fn begin_block(&mut self, address: u32, bytes: u32) -> bool {
-        let Cached { bytes: known, cost } = *self.cached(address);
+        let Cached { bytes: known, cost, fetches } = *self.cached(address);
         if known != bytes {
             return false;
         }
         self.block = address;
         self.block_end = address + bytes;
-        self.block_cost = cost;
+        (self.block_cost, self.block_fetches) = (cost, fetches);
         true
     }
 
     /// Learns the cost of the block at `address` from its `code`.
     pub(crate) fn learn_block(&mut self, address: u32, code: &[u8]) {
-        *self.cached(address) = Cached { bytes: code.len() as u32, cost: block_cost(code) };
+        let bytes = code.len() as u32;
+        *self.cached(address) =
+            Cached { bytes, cost: block_cost(address, code), fetches: Fetches::of(address, bytes) };
     }
 
     /// Forgets the costs of code outside flash: it may have been replaced.
@@ -216,6 +231,16 @@ impl Machine {
             let [count, min, max, sum] = self.tick_latency;
             let min = if count == 0 { took } else { min.min(took) };
             self.tick_latency = [count + 1, min, max.max(took), sum + took];
+        }
+    }
+
+    /// A load or store of the core, where accesses are counted.
+    pub(crate) fn count_access(&mut self, address: u32, bytes: u32) {
+        let Some(accesses) = &mut self.accesses else { return };
+        accesses.access(address, bytes);
+        if FLASH.contains(address) {
+            let depth = self.scs.stack.len();
+            self.measure.flash_read(address, self.block, depth);
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::accesses::Accesses;
+
 /// Smallest, largest and mean of a count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
@@ -26,6 +28,21 @@ pub struct Measurement {
     pub instructions: Spread,
     /// Cycles of a call: a lower bound, see the crate's documentation.
     pub cycles: Spread,
+    /// The call with the largest upper bound of its cycles, where accesses are counted.
+    pub worst: Option<WorstCall>,
+}
+
+/// The call of a function with the largest upper bound of its cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WorstCall {
+    /// Instructions.
+    pub instructions: u64,
+    /// Lower bound of its cycles.
+    pub least_cycles: u64,
+    /// Upper bound of its cycles: [`Accesses::most_cycles`].
+    pub most_cycles: u64,
+    /// What the upper bound is made of.
+    pub accesses: Accesses,
 }
 
 #[derive(Debug, Clone)]
@@ -36,6 +53,7 @@ struct Watch {
     /// Minimum, maximum, sum of instructions and of cycles.
     instructions: [u64; 3],
     cycles: [u64; 3],
+    worst: Option<WorstCall>,
 }
 
 /// Minimum, maximum and sum before the first call.
@@ -48,6 +66,31 @@ pub(crate) struct Moment {
     pub instructions: u64,
     /// Cycles passed.
     pub cycles: u64,
+    /// Accesses made, where they are counted.
+    pub accesses: Option<Accesses>,
+}
+
+impl Moment {
+    /// Counts from `start` to this moment.
+    fn since(self, start: Self) -> Self {
+        Self {
+            instructions: self.instructions - start.instructions,
+            cycles: self.cycles - start.cycles,
+            accesses: self.accesses.map(|accesses| accesses - start.accesses.unwrap_or_default()),
+        }
+    }
+
+    /// Counts of two stretches together.
+    fn plus(self, other: Self) -> Self {
+        Self {
+            instructions: self.instructions + other.instructions,
+            cycles: self.cycles + other.cycles,
+            accesses: match (self.accesses, other.accesses) {
+                (Some(one), Some(two)) => Some(one + two),
+                (one, two) => one.or(two),
+            },
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -68,6 +111,8 @@ pub(crate) struct Measure {
     preempted: Vec<Moment>,
     /// Beginnings of the blocks that calls of watched functions fetched from the flash.
     flash_blocks: BTreeSet<u32>,
+    /// What they read from the flash, and the block that read it.
+    flash_reads: BTreeSet<(u32, u32)>,
 }
 
 impl Measure {
@@ -80,6 +125,7 @@ impl Measure {
                 calls: 0,
                 instructions: NOTHING,
                 cycles: NOTHING,
+                worst: None,
             });
         }
     }
@@ -89,8 +135,10 @@ impl Measure {
         for watch in &mut self.watches {
             watch.calls = 0;
             (watch.instructions, watch.cycles) = (NOTHING, NOTHING);
+            watch.worst = None;
         }
         self.flash_blocks.clear();
+        self.flash_reads.clear();
     }
 
     /// Whether anything is watched.
@@ -143,15 +191,32 @@ impl Measure {
         self.flash_blocks.iter().copied()
     }
 
+    /// The block at `block` reads `address` of the flash, `depth` exceptions deep.
+    pub(crate) fn flash_read(&mut self, address: u32, block: u32, depth: usize) {
+        if self.calls.last().is_some_and(|call| call.depth == depth) {
+            self.flash_reads.insert((address, block));
+        }
+    }
+
+    /// What calls of watched functions read from the flash: addresses, each with the block that read it.
+    pub(crate) fn flash_reads(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.flash_reads.iter().copied()
+    }
+
     fn record(&mut self, call: Call, now: Moment) {
         let watch = &mut self.watches[call.watch];
         watch.calls += 1;
-        let took = [
-            now.instructions - call.start.instructions - call.excluded.instructions,
-            now.cycles - call.start.cycles - call.excluded.cycles,
-        ];
-        for (spread, took) in [&mut watch.instructions, &mut watch.cycles].into_iter().zip(took) {
+        let took = now.since(call.start).since(call.excluded);
+        let spreads = [(&mut watch.instructions, took.instructions), (&mut watch.cycles, took.cycles)];
+        for (spread, took) in spreads {
             *spread = [spread[0].min(took), spread[1].max(took), spread[2] + took];
+        }
+        if let Some(accesses) = took.accesses {
+            let most_cycles = accesses.most_cycles();
+            if watch.worst.is_none_or(|worst| worst.most_cycles < most_cycles) {
+                let (instructions, least_cycles) = (took.instructions, took.cycles);
+                watch.worst = Some(WorstCall { instructions, least_cycles, most_cycles, accesses });
+            }
         }
     }
 
@@ -170,8 +235,7 @@ impl Measure {
         }
         if let Some(start) = self.preempted.pop() {
             for call in self.calls.iter_mut().filter(|call| call.depth + 1 == depth) {
-                call.excluded.instructions += now.instructions - start.instructions;
-                call.excluded.cycles += now.cycles - start.cycles;
+                call.excluded = call.excluded.plus(now.since(start));
             }
         }
     }
@@ -195,6 +259,7 @@ impl Measure {
                 calls: watch.calls,
                 instructions: spread(watch.instructions, watch.calls),
                 cycles: spread(watch.cycles, watch.calls),
+                worst: watch.worst,
             })
             .collect()
     }
@@ -205,7 +270,7 @@ mod tests {
     use super::*;
 
     fn at(instructions: u64, cycles: u64) -> Moment {
-        Moment { instructions, cycles }
+        Moment { instructions, cycles, accesses: None }
     }
 
     #[test]

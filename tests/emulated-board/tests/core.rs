@@ -2,7 +2,8 @@
 
 mod common;
 
-use bowden_board::{Board, BoardError, ResetCause, Torn};
+use bowden_board::accesses::Accesses;
+use bowden_board::{Board, BoardBuilder, BoardError, ResetCause, Torn};
 use common::{CODE, STACK, elf};
 
 fn words(board: &Board, address: u32, count: usize) -> Vec<u32> {
@@ -193,6 +194,90 @@ fn a_function_costs_the_same_whether_an_interrupt_preempts_it_or_not() {
     // 80000 cycles have 79 ticks. ADDS 1, BX 2, return 10.
     assert_eq!((tick.calls, tick.instructions.max, tick.cycles.max), (79, 2, 13));
     assert!(matches!(board.measure_symbol("absent"), Err(BoardError::NoSymbol { .. })));
+}
+
+/// Puts two instructions into the CCM SRAM, then calls `work` once, which makes each kind of access and calls them.
+const ACCESSES: &[u16] = &[
+    0x4c0b, // ldr r4, =0x20000100
+    0x4d0c, // ldr r5, =0x10000100
+    0x4e0c, // ldr r6, =0x40021000
+    0x4f0d, // ldr r7, =0xe000ed08
+    0x480d, // ldr r0, =0x47703001, adds r0, #1 and bx lr
+    0x6028, // str r0, [r5]
+    0x1c68, // adds r0, r5, #1
+    0x4681, // mov r9, r0
+    0xf000, 0xf802, // bl 0x18
+    0xe7fe, // b .
+    0xbf00, // nop
+    0xb500, // 0x18, work: push {lr}
+    0x4809, // ldr r0, =0x47703001
+    0x6821, // ldr r1, [r4]
+    0x6060, // str r0, [r4, #4]
+    0x682a, // ldr r2, [r5]
+    0x6833, // ldr r3, [r6]
+    0x683b, // ldr r3, [r7]
+    0xf8d4, 0x1001, // ldr.w r1, [r4, #1]
+    0x47c8, // blx r9
+    0xbd00, // 0x2c: pop {pc}
+    0xbf00, // nop
+    0x0100, 0x2000, // literals
+    0x0100, 0x1000, //
+    0x1000, 0x4002, //
+    0xed08, 0xe000, //
+    0x3001, 0x4770, //
+];
+
+/// Counts by hand. Code: 20 bytes at 0x218 in three lines of 8 bytes, a word in the CCM SRAM, two bytes at 0x22c in a line. The load of
+/// a word at an odd address takes three accesses.
+#[test]
+fn accesses_are_those_of_a_program_counted_by_hand() {
+    let image = elf(ACCESSES, &[], &[("work", 0x18, 22)]);
+    let mut board = Board::builder(&image).count_accesses().build().expect("a valid ELF");
+    board.measure_symbol("work").expect("in the symbol table");
+    board.run_for(1e-4).expect("runs");
+    let result = &board.measurements()[0];
+    let worst = result.worst.expect("accesses are counted");
+    assert_eq!((result.calls, worst.instructions), (1, 12));
+    // PUSH 2, LDR 2, six transfers behind a transfer, BLX 2; ADDS 1, BX 2; POP 3.
+    assert_eq!(worst.least_cycles, 2 + 2 + 6 + 2 + 3 + 3);
+    let accesses = Accesses {
+        // PUSH 3, LDR 3 and 3, STR 2, LDR 3 times 3, LDR.W 3 across two words and in three parts, BLX 4; ADDS 1, BX 4; POP 6.
+        core_cycles: 3 + 3 + 3 + 2 + 9 + (3 + 1 + 2) + 4 + 1 + 4 + 6,
+        flash_blocks: 2,
+        flash_lines: 3 + 1,
+        ccm_words: 1,
+        ram_words: 0,
+        flash_reads: 1,
+        ccm_accesses: 1,
+        ram_accesses: 1 + 1 + 1 + 3 + 1,
+        register_accesses: 1,
+        core_register_accesses: 1,
+    };
+    assert_eq!(worst.accesses, accesses);
+    assert_eq!(worst.most_cycles, 41 + 2 * 5 + 4 * 4 + 9 + 1 + 7 * 2 + 8 + 2);
+    assert_eq!(board.read_from_flash(), ["no symbol (0x08000240), read by work"]);
+    assert_eq!(board.fetched_from_flash().len(), 2);
+}
+
+#[test]
+fn counting_of_accesses_changes_no_time() {
+    let image = elf(COUNTED, &[(15, 0x2a)], &[("work", 0x1c, 14)]);
+    let run = |builder: BoardBuilder| {
+        let mut board = builder.build().expect("a valid ELF");
+        board.measure_symbol("work").expect("in the symbol table");
+        board.run_for(5e-3).expect("runs");
+        (board.counters(), board.trace_hash(), board.measurements())
+    };
+    let plain = run(Board::builder(&image));
+    let counted = run(Board::builder(&image).count_accesses());
+    assert_eq!((plain.0, plain.1), (counted.0, counted.1));
+    assert_eq!(plain.2[0].cycles, counted.2[0].cycles);
+    assert_eq!(plain.2[0].worst, None);
+    // 100 blocks of the loop and one before; SysTick is no part of it: 3 + 3·100 + 1 + 1 + 4 cycles and 3 for each branch taken;
+    // 0x21c to 0x227 is two lines, 0x222 to 0x227 one, 0x228 one.
+    let worst = counted.2[0].worst.expect("accesses are counted");
+    assert_eq!(worst.accesses.core_cycles, 3 + 300 + 3 * 99 + 4);
+    assert_eq!((worst.accesses.flash_blocks, worst.accesses.flash_lines), (1 + 99 + 1, 2 + 99 + 1));
 }
 
 fn error_of(code: &[u16]) -> String {
