@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(most(at, &[0x6008]), 2, "STR immediate: 1 + address");
         assert_eq!(most(at, &[0x5088]), 3, "STR register: 2 + address");
         assert_eq!(most(at, &[0xb5f0]), 7, "PUSH {{r4-r7, lr}}: 1 + 5 + address");
-        assert_eq!(most(at, &[0xbdf0]), 11, "POP {{r4-r7, pc}}: 1 + 5 + 1 + address + 3");
+        assert_eq!(most(at, &[0xbdf0]), 10, "POP {{r4-r7, pc}}: 1 + 5 + address + 3");
         assert_eq!(most(at, &[0xe92d, 0x4ff0]), 11, "PUSH.W {{r4-r11, lr}}: 1 + 9 + address");
         assert_eq!(most(at + 2, &[0xe92d, 0x4ff0]), 12, "the same across two words");
         assert_eq!(most(at, &[0x1840, 0xe92d, 0x4ff0]), 13, "ADDS and the same across two words");

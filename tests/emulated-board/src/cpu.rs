@@ -28,6 +28,8 @@ const EXCEPTION_EXIT: u32 = 8;
 const SOFTWARE_INTERRUPT: u32 = 2;
 /// Interrupt number by which Unicorn reports BKPT.
 const BREAKPOINT: u32 = 7;
+/// EPSR of code outside of an IT block.
+const THUMB: u64 = 1 << 24;
 /// Time between two looks at the log buffer \[s\].
 const LOG_POLL_S: f64 = 0.5e-3;
 
@@ -101,7 +103,9 @@ impl Cpu {
     pub(crate) fn count_accesses(&mut self) -> Result<(), BoardError> {
         self.uc.add_mem_hook(HookType::MEM_READ | HookType::MEM_WRITE, 1, 0, |uc, _, address, size, _| {
             uc.get_data_mut().count_access(address as u32, size as u32);
-            true
+            // For such a hook the simulator puts back the state of an IT block, which its code does not keep up to date and would
+            // carry into the blocks that follow.
+            uc.reg_write(R::EPSR, THUMB).is_ok()
         })?;
         self.machine_mut().accesses = Some(Accesses::default());
         Ok(())

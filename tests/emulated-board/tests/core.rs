@@ -259,8 +259,37 @@ fn accesses_are_those_of_a_program_counted_by_hand() {
     assert_eq!(board.fetched_from_flash().len(), 2);
 }
 
+/// Loads inside an IT block under a `SysTick` each 1000 cycles.
+const CONDITIONAL: &[u16] = &[
+    0x4d06, // ldr r5, =0xe000e010
+    0xf240, 0x30e7, // movw r0, #999
+    0x6068, // str r0, [r5, #4]
+    0x2007, // movs r0, #7
+    0x6028, // str r0, [r5]
+    0x4c04, // ldr r4, =0x20000100
+    0x4280, // 0x0e: cmp r0, r0
+    0xbf08, // it eq
+    0x6822, // ldreq r2, [r4]
+    0xe7fb, // b 0x0e
+    0x3301, // 0x16, SysTick: adds r3, #1
+    0x4770, // bx lr
+    0xbf00, // nop
+    0xe010, 0xe000, // literals
+    0x0100, 0x2000, //
+];
+
 #[test]
 fn counting_of_accesses_changes_no_time() {
+    let image = elf(CONDITIONAL, &[(15, 0x16)], &[]);
+    let run = |builder: BoardBuilder| {
+        let mut board = builder.build().expect("a valid ELF");
+        board.run_for(1e-3).expect("runs");
+        board.counters()
+    };
+    let plain = run(Board::builder(&image));
+    assert_eq!(plain.exceptions, 15, "15920 cycles");
+    assert_eq!(run(Board::builder(&image).count_accesses()), plain);
+
     let image = elf(COUNTED, &[(15, 0x2a)], &[("work", 0x1c, 14)]);
     let run = |builder: BoardBuilder| {
         let mut board = builder.build().expect("a valid ELF");

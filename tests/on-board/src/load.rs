@@ -1,7 +1,8 @@
 //! The tick under full load: telemetry of every tick, a streamed reference, requests without a pause, log.
 
-use bowden_board::FirmwareUse;
-use bowden_link::message::{Goal, Mode, Reference};
+use bowden_board::accesses::EXCEPTION;
+use bowden_board::{FirmwareUse, WorstCall};
+use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{State, ToBoard};
 
 use crate::cost::Cost;
@@ -31,6 +32,75 @@ pub struct LoadedTick {
     pub samples: [u64; 2],
     /// Requests answered.
     pub requests: u64,
+}
+
+/// Cycles of a control period at the highest rate, 20 kHz, at 170 MHz.
+pub const SHORTEST_PERIOD_CYCLES: u64 = 8500;
+
+/// The tick with the largest upper bound of its cycles, and what it takes from the flash.
+#[derive(Debug, Clone)]
+pub struct WorstTick {
+    /// The handler of that tick.
+    pub handler: WorstCall,
+    /// Code that ticks fetched from the flash: function and address of each block.
+    pub fetched: Vec<String>,
+    /// Words that ticks read from the flash, and who read them.
+    pub read: Vec<String>,
+}
+
+impl WorstTick {
+    /// Of the ticks since the measurements were taken out, on a board that counts accesses and measures the tick's handler.
+    pub fn since_taken(host: &Host) -> Outcome<Self> {
+        let results = host.board.measurements();
+        let handler = results.iter().find(|result| result.function.contains("ADC1_2"));
+        let handler = handler.and_then(|result| result.worst);
+        Ok(Self {
+            handler: handler.ok_or_else(|| Failure("no tick whose accesses were counted".to_owned()))?,
+            fetched: host.board.fetched_from_flash(),
+            read: host.board.read_from_flash(),
+        })
+    }
+
+    /// Upper bound of the cycles from the request of the interrupt to the instruction behind it.
+    pub fn most_cycles(&self) -> u64 {
+        self.handler.most_cycles + EXCEPTION
+    }
+}
+
+/// The worst ticks at 20 kHz: in a run under full load, and one that takes new parameters.
+pub fn worst_ticks(host: &mut Host) -> Outcome<[WorstTick; 2]> {
+    /// Length of the run in each mode \[s\].
+    const MODE_S: f64 = 0.2;
+    host.order(&ToBoard::Enter(Goal::Off))?;
+    host.set("control.rate_divider", 1.0)?;
+    host.make_ready()?;
+    host.board.measure_symbol("ADC1_2")?;
+    under_load(host, MODE_S)?;
+    let mut running = WorstTick::since_taken(host)?;
+    for mode in [Mode::Torque, Mode::Hybrid, Mode::Impedance] {
+        let amplitude = if mode == Mode::Torque { 0.05 } else { 0.3 };
+        let sine = Reference::Generated { shape: Shape::Sine, amplitude, offset: 0.0, frequency_hz: 1.0 };
+        host.order(&ToBoard::Enter(Goal::Ready))?;
+        host.order(&ToBoard::SetReference(sine))?;
+        host.order(&ToBoard::Enter(Goal::Run(mode)))?;
+        host.reach(State::Run, 0.1)?;
+        host.board.take_measurements();
+        host.run(MODE_S)?;
+        let tick = WorstTick::since_taken(host)?;
+        running.fetched.extend(tick.fetched);
+        running.read.extend(tick.read);
+        if tick.handler.most_cycles > running.handler.most_cycles {
+            running.handler = tick.handler;
+        }
+    }
+    for list in [&mut running.fetched, &mut running.read] {
+        list.sort();
+        list.dedup();
+    }
+    host.board.take_measurements();
+    host.set("controller.integral_time", 0.11)?;
+    host.run(0.01)?;
+    Ok([running, WorstTick::since_taken(host)?])
 }
 
 /// Runs the ready joint on a streamed reference for `seconds` under full load.
@@ -64,7 +134,7 @@ pub fn under_load(host: &mut Host, seconds: f64) -> Outcome<LoadedTick> {
         }
     }
     let after = host.board.counters();
-    let results = host.board.take_measurements();
+    let results = host.board.measurements();
     let cost = |name: &str| {
         let found = results.iter().find(|result| result.function.contains(name));
         found.map(Cost::from).ok_or_else(|| Failure(format!("{name} was not called")))

@@ -4,7 +4,9 @@ use bowden_board::Board;
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{State, ToBoard};
 use bowden_on_board_tests::Outcome;
-use bowden_on_board_tests::load::under_load;
+use bowden_on_board_tests::host::Host;
+use bowden_on_board_tests::load::{SHORTEST_PERIOD_CYCLES, under_load, worst_ticks};
+use bowden_on_board_tests::image;
 
 use crate::ready;
 use crate::stop::LIVELY;
@@ -91,5 +93,17 @@ fn the_tick_runs_from_the_ccm_sram() -> Outcome {
         assert!(fetched.iter().all(|block| block.contains("memcpy")), "{fetched:?}");
         assert_eq!(host.status()?.state, State::Run);
     }
+    Ok(())
+}
+
+/// Every access at its worst: waits of the flash, misses of its caches, DMA at each access of RAM, each instruction at the largest count
+/// of the manual.
+#[test]
+fn the_upper_bound_of_the_worst_tick_is_within_the_period_of_twenty_kilohertz() -> Outcome {
+    let board = Board::builder(&image::firmware()?).seed(1).count_accesses().build()?;
+    let mut host = Host::connect(board)?;
+    host.make_ready()?;
+    let [running, renewed] = worst_ticks(&mut host)?;
+    println!("{running:#?} {} {renewed:#?} {}", running.most_cycles(), renewed.most_cycles());
     Ok(())
 }
