@@ -16,6 +16,9 @@
 //! | register on AHB or APB | 8 | two cycles of APB, bridge and change of the master, for DMA and for the core (AMBA APB; AN4031, table 4) |
 //! | register of the core | 2 | the private bus, no other master on it |
 //!
+//! DMA holds up as many accesses of a memory as it makes itself, and each item that it moves is one: a caller who knows how many these
+//! are says so.
+//!
 //! A word or half-word that is not aligned takes three or two accesses (TRM, 3.3.2). The entry of an exception and its return are
 //! [`EXCEPTION`].
 
@@ -32,14 +35,14 @@ const FLASH_BUSY: u64 = LATENCY + 1;
 const LINE: u32 = 8;
 const CCM_DATA: u64 = 1;
 const RAM_DATA: u64 = 2;
-const RAM_FETCH: u64 = 1 + RAM_DATA;
 const REGISTER: u64 = 8;
 const CORE_REGISTER: u64 = 2;
 /// Words of the frame of an exception with the FPU's registers, lazily stored or not.
 const FRAME_WORDS: u64 = 26;
 
 /// Upper bound of the cycles of an exception's entry and return beside its handler: 12 and 10 (Cortex-M4 TRM, 3.9.1), the vector from
-/// the flash, 18 words of the FPU stored late and loaded (ARM AN298), and waits for each word of the frame.
+/// the flash, 18 words of the FPU stored late and loaded (ARM AN298), and a wait
+/// for each word of the frame.
 pub const EXCEPTION: u64 = 12 + 10 + FLASH_BUSY + LATENCY + 2 * 18 + 2 * FRAME_WORDS * RAM_DATA;
 
 /// Fetches of a basic block.
@@ -88,22 +91,25 @@ pub struct Accesses {
     pub register_accesses: u64,
     /// Loads and stores of the core's own registers.
     pub core_register_accesses: u64,
+    /// Items that DMA moved meanwhile; the upper bound goes by what its caller knows.
+    pub dma_items: u64,
 }
 
 impl Accesses {
-    /// Upper bound of the cycles.
-    pub fn most_cycles(&self) -> u64 {
-        self.core_cycles + self.wait_cycles()
+    /// Upper bound of the cycles, where DMA moves at most `dma_items` meanwhile.
+    pub fn most_cycles(&self, dma_items: u64) -> u64 {
+        self.core_cycles + self.wait_cycles(dma_items)
     }
 
     /// Upper bound of the cycles that memories and buses add.
-    pub fn wait_cycles(&self) -> u64 {
+    pub fn wait_cycles(&self, dma_items: u64) -> u64 {
         FLASH_BUSY * self.flash_blocks
             + LATENCY * self.flash_lines
-            + RAM_FETCH * self.ram_words
+            + self.ram_words
+            + RAM_DATA * self.ram_words.min(dma_items)
             + (FLASH_BUSY + LATENCY) * self.flash_reads
             + CCM_DATA * self.ccm_accesses
-            + RAM_DATA * self.ram_accesses
+            + RAM_DATA * self.ram_accesses.min(dma_items)
             + REGISTER * self.register_accesses
             + CORE_REGISTER * self.core_register_accesses
     }
@@ -149,6 +155,7 @@ impl Accesses {
             ram_accesses: operation(self.ram_accesses, other.ram_accesses),
             register_accesses: operation(self.register_accesses, other.register_accesses),
             core_register_accesses: operation(self.core_register_accesses, other.core_register_accesses),
+            dma_items: operation(self.dma_items, other.dma_items),
         }
     }
 }

@@ -36,7 +36,8 @@ pub struct BoardBuilder<'a> {
     parameter_pages: Option<Vec<u8>>,
     /// Two banks of flash, brown-out level.
     options: (bool, u8),
-    count_accesses: bool,
+    /// Items that DMA moves at most during a call, if accesses are counted.
+    count_accesses: Option<u64>,
 }
 
 impl BoardBuilder<'_> {
@@ -78,11 +79,12 @@ impl BoardBuilder<'_> {
         self
     }
 
-    /// Counts fetches, loads and stores by memory, for the upper bound of the cycles in [`Measurement::worst`]. Virtual time is the
-    /// same; the emulation takes about twice as long.
+    /// Counts fetches, loads and stores by memory, for the upper bound of the cycles in [`Measurement::worst`]. During a call of a
+    /// measured function DMA moves at most `dma_items`; with `u64::MAX` each access of SRAM1 and SRAM2 waits for it. Virtual time is
+    /// the same; the emulation takes about twice as long.
     #[must_use]
-    pub fn count_accesses(mut self) -> Self {
-        self.count_accesses = true;
+    pub fn count_accesses(mut self, dma_items: u64) -> Self {
+        self.count_accesses = Some(dma_items);
         self
     }
 
@@ -115,8 +117,8 @@ impl BoardBuilder<'_> {
         }
         bus.trace.watch(TICK_MARKER);
         let mut cpu = Cpu::new(image, bus, rtt)?;
-        if self.count_accesses {
-            cpu.count_accesses()?;
+        if let Some(dma_items) = self.count_accesses {
+            cpu.count_accesses(dma_items)?;
         }
         Ok(Board { cpu, injected: Vec::new() })
     }
@@ -201,7 +203,7 @@ impl Board {
             motor_reversed: false,
             parameter_pages: None,
             options: (true, 0),
-            count_accesses: false,
+            count_accesses: None,
         }
     }
 

@@ -100,14 +100,16 @@ impl Cpu {
     }
 
     /// Counts fetches, loads and stores from now on.
-    pub(crate) fn count_accesses(&mut self) -> Result<(), BoardError> {
+    pub(crate) fn count_accesses(&mut self, dma_items: u64) -> Result<(), BoardError> {
         self.uc.add_mem_hook(HookType::MEM_READ | HookType::MEM_WRITE, 1, 0, |uc, _, address, size, _| {
             uc.get_data_mut().count_access(address as u32, size as u32);
             // For such a hook the simulator puts back the state of an IT block, which its code does not keep up to date and would
             // carry into the blocks that follow.
             uc.reg_write(R::EPSR, THUMB).is_ok()
         })?;
-        self.machine_mut().accesses = Some(Accesses::default());
+        let machine = self.machine_mut();
+        machine.accesses = Some(Accesses::default());
+        machine.measure.dma_items = dma_items;
         Ok(())
     }
 

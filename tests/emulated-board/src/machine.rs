@@ -155,7 +155,9 @@ impl Machine {
 
     /// Counters now.
     pub(crate) fn moment(&self) -> Moment {
-        Moment { instructions: self.instructions, cycles: self.cycle, accesses: self.accesses }
+        let dma_items = self.bus.dma_beats;
+        let accesses = self.accesses.map(|accesses| Accesses { dma_items, ..accesses });
+        Moment { instructions: self.instructions, cycles: self.cycle, accesses }
     }
 
     /// Counts the block that ran as done, the next one being at `next`.

@@ -113,6 +113,8 @@ pub(crate) struct Measure {
     flash_blocks: BTreeSet<u32>,
     /// What they read from the flash, and the block that read it.
     flash_reads: BTreeSet<(u32, u32)>,
+    /// Items that DMA moves at most during a call.
+    pub dma_items: u64,
 }
 
 impl Measure {
@@ -212,7 +214,7 @@ impl Measure {
             *spread = [spread[0].min(took), spread[1].max(took), spread[2] + took];
         }
         if let Some(accesses) = took.accesses {
-            let most_cycles = accesses.most_cycles();
+            let most_cycles = accesses.most_cycles(self.dma_items);
             if watch.worst.is_none_or(|worst| worst.most_cycles < most_cycles) {
                 let (instructions, least_cycles) = (took.instructions, took.cycles);
                 watch.worst = Some(WorstCall { instructions, least_cycles, most_cycles, accesses });

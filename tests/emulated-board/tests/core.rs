@@ -232,7 +232,7 @@ const ACCESSES: &[u16] = &[
 #[test]
 fn accesses_are_those_of_a_program_counted_by_hand() {
     let image = elf(ACCESSES, &[], &[("work", 0x18, 22)]);
-    let mut board = Board::builder(&image).count_accesses().build().expect("a valid ELF");
+    let mut board = Board::builder(&image).count_accesses(u64::MAX).build().expect("a valid ELF");
     board.measure_symbol("work").expect("in the symbol table");
     board.run_for(1e-4).expect("runs");
     let result = &board.measurements()[0];
@@ -252,9 +252,11 @@ fn accesses_are_those_of_a_program_counted_by_hand() {
         ram_accesses: 1 + 1 + 1 + 3 + 1,
         register_accesses: 1,
         core_register_accesses: 1,
+        dma_items: 0,
     };
     assert_eq!(worst.accesses, accesses);
     assert_eq!(worst.most_cycles, 41 + 2 * 5 + 4 * 4 + 9 + 1 + 7 * 2 + 8 + 2);
+    assert_eq!(accesses.most_cycles(3), worst.most_cycles - (7 - 3) * 2, "DMA makes three accesses");
     assert_eq!(board.read_from_flash(), ["no symbol (0x08000240), read by work"]);
     assert_eq!(board.fetched_from_flash().len(), 2);
 }
@@ -288,7 +290,7 @@ fn counting_of_accesses_changes_no_time() {
     };
     let plain = run(Board::builder(&image));
     assert_eq!(plain.exceptions, 15, "15920 cycles");
-    assert_eq!(run(Board::builder(&image).count_accesses()), plain);
+    assert_eq!(run(Board::builder(&image).count_accesses(u64::MAX)), plain);
 
     let image = elf(COUNTED, &[(15, 0x2a)], &[("work", 0x1c, 14)]);
     let run = |builder: BoardBuilder| {
@@ -298,7 +300,7 @@ fn counting_of_accesses_changes_no_time() {
         (board.counters(), board.trace_hash(), board.measurements())
     };
     let plain = run(Board::builder(&image));
-    let counted = run(Board::builder(&image).count_accesses());
+    let counted = run(Board::builder(&image).count_accesses(u64::MAX));
     assert_eq!((plain.0, plain.1), (counted.0, counted.1));
     assert_eq!(plain.2[0].cycles, counted.2[0].cycles);
     assert_eq!(plain.2[0].worst, None);
