@@ -152,7 +152,7 @@ fn dispatch(cli: &Cli) -> Result<Outcome, Failure> {
 }
 
 /// One line on stderr; a closed stderr is no reason to stop.
-fn say(line: &str) {
+pub(crate) fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "bowden: {line}");
 }
 

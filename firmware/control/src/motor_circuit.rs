@@ -41,12 +41,15 @@
 //!
 //! An open lead is named 20 to 40 ms after the loop asks for enough. Position, torque and impedance loop integrate their error up to the
 //! current limit, so they do where `R limits.current > 2.5 R i_m + V correction.dead_zone.limit + count`: 4.6 of 6 V for the default joint.
+//! [`OpenLead`] says whether a set of parameters keeps to that; the host warns where it does not.
 //! Lower values of `supervisor.rest_current` and `correction.dead_zone.limit`, where the bench allows them, name it sooner. A joint that
 //! friction holds where it is to be needs no current; there an open lead is not seen.
 
 use bowden_link::Fault;
+use bowden_link::message::Refusal;
 
 use crate::detection::Detection;
+use crate::parameters::{Parameters, tick_config};
 use crate::scale::{Angle, Current, Gain, Quantity, Ratio, Share, Voltage};
 
 /// Largest resistance, with its margin for the way to a steady state, over the one of the parameters.
@@ -77,6 +80,71 @@ pub struct CircuitConfig {
     pub none: Current,
     /// Largest current that may be behind it, `i_m`.
     pub most: Current,
+}
+
+impl CircuitConfig {
+    /// Largest part of a look's voltage that makes no current.
+    #[inline]
+    fn unknown(&self, back_emf: Voltage, bus: Voltage) -> Voltage {
+        self.dead_zone.of(bus).plus(BACK_EMF_TOLERANCE.of(back_emf.magnitude())).plus(self.count)
+    }
+
+    /// Least current that a voltage makes, the unknown part taken off, and whether a reading without current cannot hide it.
+    #[inline]
+    fn shows(&self, known: Voltage) -> (Current, bool) {
+        let least = self.least.apply(known.magnitude());
+        (least, least > self.most)
+    }
+
+    /// Least voltage at a motor that stands at which a look without current counts.
+    fn least_voltage(&self, bus: Voltage) -> Voltage {
+        let unknown = self.unknown(Voltage::ZERO, bus);
+        let shows = |bits: i32| self.shows(Voltage::from_bits(bits).minus(unknown)).1;
+        let (mut hidden, mut seen) = (unknown.to_bits(), i32::MAX);
+        while seen - hidden > 1 {
+            let middle = hidden + (seen - hidden) / 2;
+            if shows(middle) { seen = middle } else { hidden = middle }
+        }
+        Voltage::from_bits(seen)
+    }
+}
+
+/// Whether the loops can ask for enough voltage that a lead that is open is named while the motor stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenLead {
+    /// Largest voltage that they ask for \[V\]: resistance times current limit, at most the bus voltage.
+    pub reached_v: f32,
+    /// Voltage from which an open lead is named \[V\].
+    pub needed_v: f32,
+    /// Bus voltage of both \[V\]: the one of those allowed at which the first is least of the second.
+    pub bus_v: f32,
+}
+
+impl OpenLead {
+    /// That of these parameters. For the host: the tick looks at what is there.
+    ///
+    /// # Errors
+    /// As [`tick_config`].
+    pub fn of(parameters: &Parameters) -> Result<Self, Refusal> {
+        let circuit = tick_config(parameters)?.circuit;
+        let limit_v = parameters.limits.current * parameters.motor.resistance;
+        let [low, high] =
+            [parameters.supervisor.bus_minimum, parameters.supervisor.bus_maximum].map(|bus_v| {
+                let needed_v = circuit.least_voltage(Voltage::from_f32(bus_v)).to_f32();
+                Self { reached_v: limit_v.min(parameters.bridge.duty_limit * bus_v), needed_v, bus_v }
+            });
+        Ok(if low.margin_v() < high.margin_v() { low } else { high })
+    }
+
+    /// Whether an open lead is named at every bus voltage that is allowed.
+    #[must_use]
+    pub fn is_named(&self) -> bool {
+        self.margin_v() > 0.0
+    }
+
+    fn margin_v(&self) -> f32 {
+        self.reached_v - self.needed_v
+    }
 }
 
 /// State of the watch.
@@ -120,8 +188,7 @@ impl MotorCircuit {
         // A duty of 1 is 32767, here 32768: 3e-5 too little.
         let voltage = Voltage::from_bits(((i64::from(duty_raw) * i64::from(bus.to_bits())) >> 15) as i32);
         let across = voltage.minus(back_emf);
-        let unknown =
-            config.dead_zone.of(bus).plus(BACK_EMF_TOLERANCE.of(back_emf.magnitude())).plus(config.count);
+        let unknown = config.unknown(back_emf, bus);
         self.known = across.minus(across.limited(unknown));
     }
 
@@ -130,8 +197,8 @@ impl MotorCircuit {
     pub fn current(&mut self, config: &CircuitConfig) -> Option<Detection> {
         let current_bits = mean(config, core::mem::take(&mut self.current_sum)) << DROPPED;
         let current = Current::from_bits(current_bits).magnitude();
-        let least = config.least.apply(self.known.magnitude());
-        self.looks = if current > config.none || least <= config.most {
+        let (least, shows) = config.shows(self.known);
+        self.looks = if current > config.none || !shows {
             0
         } else if self.known > Voltage::ZERO {
             self.looks.max(0).saturating_add(1)
@@ -360,13 +427,41 @@ mod tests {
         assert!(!named(-24_575) && named(24_575));
     }
 
-    /// Without that an open lead of the default joint would never be named.
+    /// By hand, as above, at the largest bus voltage of 30 V: 3 V of dead zone, 0.138 V of a count, 5 Ω times 0.4067 A. The limit of 3 A
+    /// makes 6 V at 2 Ω.
     #[test]
-    fn the_current_limit_of_the_default_joint_is_beyond_the_bound() {
-        let (parameters, config) = (Parameters::default(), config().circuit);
-        let volts = parameters.limits.current * parameters.motor.resistance;
-        let lost_v = parameters.correction.dead_zone.limit * 24.0;
-        let least = config.least.apply(Voltage::from_f32(volts - lost_v).minus(config.count));
-        assert!(least > Current::from_f32(1.5 * config.most.to_f32()), "{least:?}");
+    fn an_open_lead_of_the_default_joint_is_named_at_every_bus_voltage() {
+        let lead = OpenLead::of(&Parameters::default()).unwrap();
+        assert!((lead.needed_v - (3.0 + 0.138 + 5.0 * 0.4067)).abs() < 2e-3, "{lead:?}");
+        assert_eq!((lead.reached_v, lead.bus_v), (6.0, 30.0));
+        assert!(lead.is_named());
+    }
+
+    /// The bound is the one of the watch itself: an open lead is named a code of the duty above it, and not below.
+    #[test]
+    fn the_bound_is_where_the_watch_begins_to_name_an_open_lead() {
+        let config = config();
+        let bound_v = f64::from(config.circuit.least_voltage(Voltage::from_f32(BUS_V as f32)).to_f32());
+        let code_v = BUS_V / 32_767.0;
+        let found = |volts: f64| Motor { open: true, ..Motor::new() }.found(1000, volts, 0.0);
+        assert!(
+            found(bound_v + 2.0 * code_v).is_some() && found(bound_v - 2.0 * code_v).is_none(),
+            "{bound_v}"
+        );
+    }
+
+    #[test]
+    fn a_small_current_limit_or_a_low_supply_leaves_an_open_lead_unnamed() {
+        let mut parameters = Parameters::default();
+        parameters.limits.current = 2.0;
+        let lead = OpenLead::of(&parameters).unwrap();
+        assert!(!lead.is_named() && lead.reached_v == 4.0, "{lead:?}");
+        // 10 Ω: 25 Ω times 0.4067 A and 0.1 V and a count are more than the bridge makes of 9 V.
+        let mut parameters = Parameters::default();
+        parameters.motor.resistance = 10.0;
+        parameters.supervisor.bus_minimum = 9.0;
+        let lead = OpenLead::of(&parameters).unwrap();
+        assert!(!lead.is_named() && lead.bus_v == 9.0, "{lead:?}");
+        assert!((lead.reached_v - 0.95 * 9.0).abs() < 1e-3, "{lead:?}");
     }
 }

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
+use bowden_control::motor_circuit::OpenLead;
 use bowden_control::parameters::Parameters;
 use bowden_core::outcome::Failure;
 use bowden_core::output;
@@ -165,6 +166,17 @@ impl ParameterSet {
             }
         }
         parameters
+    }
+
+    /// What this set keeps the board from noticing, in one line; `None` if nothing, or if the board refuses the set anyway.
+    pub fn warning(&self) -> Option<String> {
+        let lead = OpenLead::of(&self.control()).ok().filter(|lead| !lead.is_named())?;
+        let OpenLead { reached_v, needed_v, bus_v } = lead;
+        Some(format!(
+            "warning: an open motor lead can go unnoticed: motor.resistance times limits.current gives {reached_v:.1} V at a bus \
+             of {bus_v:.0} V, fault 25 needs more than {needed_v:.1} V; raise limits.current, or lower supervisor.rest_current \
+             or correction.dead_zone.limit"
+        ))
     }
 
     /// The set with other values for some parameters.

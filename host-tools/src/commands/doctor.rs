@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_host_link::serial::{USB_PRODUCT, USB_VENDOR, udev_rule};
+use bowden_host_link::{Client, ParameterSet};
 use serde::Serialize;
 
 use super::port::timeout;
@@ -75,7 +76,7 @@ impl DoctorArguments {
             port(&machine.boards(USB_VENDOR, USB_PRODUCT)),
         ];
         if let Some(port) = &self.port {
-            checks.push(board(port, self.timeout));
+            checks.extend(board(port, self.timeout));
         }
         if self.json {
             print_json(&checks)?;
@@ -168,11 +169,25 @@ fn port(boards: &[Device]) -> Check {
     Check::new("port", Grade::Ok, format!("{}, serial number {}", names.join(", "), first.serial), "")
 }
 
-fn board(port: &str, timeout: Duration) -> Check {
+/// The board, and what its parameters keep it from noticing.
+fn board(port: &str, timeout: Duration) -> Vec<Check> {
     let mut client = match bowden_host_link::connect(port, timeout) {
         Ok(client) => client,
-        Err(error) => return Check::new("board", Grade::Wrong, error.to_string(), ""),
+        Err(error) => return vec![Check::new("board", Grade::Wrong, error.to_string(), "")],
     };
+    let mut checks = vec![state(&mut client)];
+    // A board that does not answer was named.
+    if let Ok(parameters) = ParameterSet::read(&mut client)
+        && let Some(warning) = parameters.warning()
+    {
+        let (found, next) = warning.rsplit_once("; ").unwrap_or((&warning, ""));
+        let found = found.strip_prefix("warning: ").unwrap_or(found);
+        checks.push(Check::new("parameters", Grade::Hint, found, next));
+    }
+    checks
+}
+
+fn state(client: &mut Client) -> Check {
     let status = client.status();
     let greeting = client.greeting();
     let found = format!("{}, firmware {} {}", greeting.board, greeting.firmware, greeting.revision);

@@ -15,6 +15,7 @@ use table::TableArguments;
 
 use super::port::PortArguments;
 use super::{print, print_json};
+use crate::cli::say;
 
 /// Arguments of `bowden params`.
 #[derive(Clone, Debug, clap::Args)]
@@ -105,9 +106,23 @@ impl FromRig {
         };
         let transfer = Transfer::new(&rig, &self.rig.display().to_string(), parameters, &recorded)?;
         let values = transfer.values();
+        self.transfer(client, parameters, transfer, &values, json)?;
+        warn(&parameters.with(&values));
+        Ok(())
+    }
+
+    /// Shows the changes and sets them.
+    fn transfer(
+        &self,
+        client: &mut Client,
+        parameters: &ParameterSet,
+        transfer: Transfer,
+        values: &[(u16, f32)],
+        json: bool,
+    ) -> Result<(), Failure> {
         if json {
             if !self.dry_run {
-                parameters.replace(client, &values)?;
+                parameters.replace(client, values)?;
             }
             return print_json(&Transferred { set: !self.dry_run, transfer });
         }
@@ -119,8 +134,15 @@ impl FromRig {
         if self.dry_run {
             return print(&format!("{count} would be set\n"));
         }
-        parameters.replace(client, &values)?;
+        parameters.replace(client, values)?;
         print(&format!("{count} set until the board is switched off; `store` keeps them\n"))
+    }
+}
+
+/// Says on stderr what a set of parameters keeps the board from noticing; the exit status stays.
+fn warn(parameters: &ParameterSet) {
+    if let Some(warning) = parameters.warning() {
+        say(&warning);
     }
 }
 
@@ -158,10 +180,12 @@ impl ParamsArguments {
                     .map(|assignment| parameters.assignment(assignment))
                     .collect::<Result<Vec<_>, _>>()?;
                 parameters.write(&mut client, &values)?;
+                warn(&parameters.with(&values));
             }
             Action::Load { file } => {
                 let values = parameters.load(file)?;
                 parameters.write(&mut client, &values)?;
+                warn(&parameters.with(&values));
             }
             Action::FromRig(from_rig) => from_rig.run(&mut client, &parameters, self.json)?,
             Action::Save { file } => {
@@ -169,7 +193,10 @@ impl ParamsArguments {
                 output::write_file(file, |file| file.write_all(text.as_bytes()))?;
             }
             Action::Table(table) => table.run(&mut client, &parameters, self.json)?,
-            Action::Store => client.store_parameters()?,
+            Action::Store => {
+                client.store_parameters()?;
+                warn(&parameters);
+            }
             Action::Default => client.default_parameters()?,
         }
         Ok(Outcome::done())

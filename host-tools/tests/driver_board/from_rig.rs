@@ -76,6 +76,40 @@ fn a_dry_run_shows_the_table_and_sets_nothing() {
     assert_eq!(last, "2 parameters set until the board is switched off; `store` keeps them");
 }
 
+/// Fault 25 needs more than 2.5 R 0.4067 A, 0.1 of the bus and 0.14 V of an encoder's count, at 30 V 3.14 V and 1.02 V/Ω; R times the
+/// limit of the current is what it gets.
+#[test]
+fn parameters_that_hide_an_open_lead_are_warned_of_in_one_line() {
+    let warning = |reached: &str, needed: &str| {
+        format!(
+            "bowden: warning: an open motor lead can go unnoticed: motor.resistance times limits.current gives {reached} V at a bus \
+             of 30 V, fault 25 needs more than {needed} V; raise limits.current, or lower supervisor.rest_current or \
+             correction.dead_zone.limit\n"
+        )
+    };
+    let folder =
+        folder_with("rig.toml", &rig("", "").replace("resistance_ohm = 2.5", "resistance_ohm = 1.0"));
+    let file = "schema = \"bowden-parameters/1\"\nmotor.resistance = 1.5\n";
+    fs::write(folder.path().join("p.toml"), file).unwrap();
+    for (arguments, stderr) in [
+        (["set", "limits.current=2.0"].as_slice(), warning("4.0", "5.2")),
+        (&["set", "limits.current=2.8"], String::new()),
+        (
+            &["set", "limits.current=2.0", "supervisor.rest_current=0.05", "correction.dead_zone.limit=0.05"],
+            String::new(),
+        ),
+        (&["load", "p.toml"], warning("4.5", "4.7")),
+        (&["from-rig", "rig.toml", "--dry-run"], warning("3.0", "4.2")),
+        (&["from-rig", "rig.toml"], warning("3.0", "4.2")),
+        (&["from-rig", "rig.toml", "--json"], warning("3.0", "4.2")),
+        (&["store"], String::new()),
+    ] {
+        let all = [&["params", "--port", "sim"], arguments].concat();
+        let (status, _, told) = bowden(folder.path(), &all);
+        assert_eq!((status, told), (0, stderr), "{arguments:?}");
+    }
+}
+
 #[test]
 fn a_rig_that_agrees_with_the_board_changes_nothing() {
     // Within the precision of the parameter, an encoder's count and a step of the converter's zero.

@@ -112,6 +112,29 @@ fn doctor_says_whether_firmware_and_program_fit() {
 }
 
 #[test]
+fn doctor_and_store_warn_of_parameters_that_hide_an_open_lead() {
+    let terminal = Terminal::new(Fake::new(Mishaps::default()));
+    let folder = tempfile::tempdir().unwrap();
+    let hints = || {
+        let (status, stdout, _) = terminal.bowden(folder.path(), "doctor", &["--json"]);
+        let checks: Vec<serde_json::Value> = serde_json::from_str(&stdout).unwrap();
+        let hints = checks.into_iter().filter(|check| check["subject"] == "parameters");
+        (status, hints.collect::<Vec<_>>())
+    };
+    let (before, none) = hints();
+    assert_eq!(none, [serde_json::Value::Null; 0]);
+    let (status, _, stderr) = terminal.bowden(folder.path(), "params", &["set", "motor.resistance=1"]);
+    assert!(status == 0 && stderr.starts_with("bowden: warning: an open motor lead"), "{stderr}");
+    let (status, _, stored) = terminal.bowden(folder.path(), "params", &["store"]);
+    assert_eq!((status, stored), (0, stderr));
+    let (status, hints) = hints();
+    let [hint] = hints.as_slice() else { panic!("{hints:?}") };
+    assert_eq!((status, hint["grade"].as_str()), (before, Some("hint")));
+    assert!(hint["found"].as_str().unwrap().starts_with("an open motor lead can go unnoticed"), "{hint}");
+    assert!(hint["next"].as_str().unwrap().starts_with("raise limits.current"), "{hint}");
+}
+
+#[test]
 fn what_cannot_be_done_is_told_before_the_port_is_opened() {
     let record = |arguments: &[&'static str]| -> Vec<&'static str> {
         [&["record", "--port", "/dev/ttyACM99"], arguments].concat()

@@ -165,7 +165,9 @@ impl Before {
         match class {
             Class::Load | Class::Store | Class::StoreIndexed if !writes_back => Self::Transfer,
             // Only ADD and SUB of the stack pointer, and those of high registers, reach it.
-            Class::Plain(1) if !wide && first >> 8 != 0xb0 && first >> 10 != 0b010001 => Self::NotStackPointer,
+            Class::Plain(1) if !wide && first >> 8 != 0xb0 && first >> 10 != 0b010001 => {
+                Self::NotStackPointer
+            }
             _ => Self::Anything,
         }
     }
@@ -200,9 +202,7 @@ fn most_cycles(class: Class, first: u16, second: u16, before: Before) -> u32 {
         Class::Plain(_) if !wide && first & 0xffe8 == 0xb660 => MOST_SYSTEM, // CPS
         Class::Plain(cycles) if !wide => cycles,
         // LDM, STM, LDRD, STRD, exclusives, VLDR, VSTR, VLDM, VSTM
-        Class::Plain(cycles) if first & 0xfe00 == 0xe800 || first & 0xee00 == 0xec00 => {
-            cycles + stall
-        }
+        Class::Plain(cycles) if first & 0xfe00 == 0xe800 || first & 0xee00 == 0xec00 => cycles + stall,
         Class::Plain(cycles) if first & 0xef00 == 0xee00 => cycles + FP_STALL,
         Class::Plain(DIVISION) => MOST_DIVISION,
         Class::Plain(_) if first & 0xf800 == 0xf000 && second & 0x8000 != 0 => MOST_SYSTEM,
@@ -289,7 +289,11 @@ mod tests {
         assert_eq!(most(at, &[0xb081, 0x9801]), 4, "SUB SP, LDR by SP: 1, 2 + address");
         assert_eq!(most(at, &[0x4485, 0x9801]), 4, "ADD SP, r0, LDR by SP: 1, 2 + address");
         assert_eq!(most(at, &[0x1840, 0x4801]), 3, "ADDS, LDR literal: 1, 2");
-        assert_eq!(most(at, &[0xf850, 0x1b04, 0x6802]), 6, "LDR post-indexed, LDR by the same: 2 + address each");
+        assert_eq!(
+            most(at, &[0xf850, 0x1b04, 0x6802]),
+            6,
+            "LDR post-indexed, LDR by the same: 2 + address each"
+        );
         assert_eq!(most(at, &[0x6008]), 2, "STR immediate: 1 + address");
         assert_eq!(most(at, &[0x5088]), 3, "STR register: 2 + address");
         assert_eq!(most(at, &[0xb5f0]), 7, "PUSH {{r4-r7, lr}}: 1 + 5 + address");

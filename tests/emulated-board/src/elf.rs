@@ -142,7 +142,8 @@ impl Image {
 
     /// Name of the function that holds `address`.
     pub(crate) fn function_at(&self, address: u32) -> String {
-        find(&self.functions, address & !1).map_or_else(|| NO_SYMBOL.to_owned(), |function| function.name.clone())
+        find(&self.functions, address & !1)
+            .map_or_else(|| NO_SYMBOL.to_owned(), |function| function.name.clone())
     }
 
     /// Name of the static, else of the function, that holds `address`.

@@ -5,8 +5,8 @@ use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{State, ToBoard};
 use bowden_on_board_tests::Outcome;
 use bowden_on_board_tests::host::Host;
-use bowden_on_board_tests::load::{DMA_ITEMS_IN_A_TICK, SHORTEST_PERIOD_CYCLES, under_load, worst_ticks};
 use bowden_on_board_tests::image;
+use bowden_on_board_tests::load::{DMA_ITEMS_IN_A_TICK, SHORTEST_PERIOD_CYCLES, under_load, worst_ticks};
 
 use crate::ready;
 use crate::stop::LIVELY;
