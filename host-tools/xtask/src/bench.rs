@@ -88,7 +88,7 @@ fn host() -> Result<(), String> {
 }
 
 fn board() -> Result<(), String> {
-    println!("\n== the board: release images on the emulated processor; its cycles are a lower bound");
+    println!("\n== the board: release images on the emulated processor; lower and upper bounds of cycles");
     on_board("on-board-figures", &[])
 }
 

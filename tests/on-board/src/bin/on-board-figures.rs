@@ -4,12 +4,15 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use bowden_board::Board;
+use bowden_board::accesses::EXCEPTION;
 use bowden_link::ToBoard;
 use bowden_link::message::{Reference, Shape};
 use bowden_on_board_tests::cost::{ControlAlone, Cost, SourceCosts};
 use bowden_on_board_tests::course::{LoopError, follow_truth};
 use bowden_on_board_tests::host::Host;
-use bowden_on_board_tests::load::{LoadedTick, under_load};
+use bowden_on_board_tests::load::{
+    DMA_ITEMS_IN_A_TICK, LoadedTick, SHORTEST_PERIOD_CYCLES, WorstTick, under_load, worst_ticks,
+};
 use bowden_on_board_tests::ticks::CYCLES_PER_US;
 use bowden_on_board_tests::{Outcome, image};
 
@@ -35,7 +38,7 @@ fn figures() -> Outcome {
     let (firmware, measure) = (image::firmware()?, image::measure()?);
     println!("Figures of the release images on the emulated STM32G474RE.");
     println!(
-        "Instructions are exact. Cycles are a lower bound: flash wait states and bus contention are not modelled."
+        "Instructions are exact. Cycles are a lower bound, without flash wait states and bus contention, where nothing else is said."
     );
     println!();
     print_costs(&ControlAlone::new(&measure)?.costs()?);
@@ -43,6 +46,10 @@ fn figures() -> Outcome {
     let mut host = Host::connect(Board::builder(&firmware).build()?)?;
     host.make_ready()?;
     print_load(&under_load(&mut host, LOAD_S)?, &host);
+
+    let mut host = Host::connect(Board::builder(&firmware).count_accesses(DMA_ITEMS_IN_A_TICK).build()?)?;
+    host.make_ready()?;
+    print_bounds(&worst_ticks(&mut host)?);
 
     println!("closed loop: true joint angle against its reference, sine of 0.5 rad at 0.2 Hz, {SINE_S} s");
     println!("{:<28}{:>12}{:>12}{:>26}", "lag angle", "RMS mrad", "largest", "emulation, of real time");
@@ -105,6 +112,42 @@ fn print_load(load: &LoadedTick, host: &Host) {
     line("deepest stack, bytes", stack, "");
     line("flash, bytes", format!("{} of {}", memory.image.flash_bytes, Board::flash_bytes()), "");
     line("static RAM, bytes", memory.image.ram_bytes.to_string(), "");
+    println!();
+}
+
+/// Both bounds of the worst ticks at 20 kHz, what the upper one is made of, and what the ticks take from the flash.
+fn print_bounds([driving, other]: &[WorstTick; 2]) {
+    let row = |name: &str, value: &dyn Fn(&WorstTick) -> String| {
+        println!("{name:<40}{:>16}{:>16}", value(driving), value(other));
+    };
+    let count = |name: &str, value: &dyn Fn(&WorstTick) -> u64| row(name, &|tick| value(tick).to_string());
+    println!(
+        "worst tick at 20 kHz, {SHORTEST_PERIOD_CYCLES} cycles: every mode, full load; every access at its worst"
+    );
+    println!("{:<40}{:>16}{:>16}", "", "while driving", "any other");
+    count("instructions", &|tick| tick.handler.instructions);
+    count("cycles, at least", &|tick| tick.handler.least_cycles);
+    count("cycles, at most", &WorstTick::most_cycles);
+    row("  of the period", &|tick| {
+        format!("{:.0} %", 100.0 * tick.most_cycles() as f64 / SHORTEST_PERIOD_CYCLES as f64)
+    });
+    count("  instructions by themselves", &|tick| tick.handler.accesses.core_cycles);
+    count("  waits for memories and buses", &|tick| tick.handler.accesses.wait_cycles(DMA_ITEMS_IN_A_TICK));
+    row("  entry and return", &|_| EXCEPTION.to_string());
+    count("words of code from the CCM SRAM", &|tick| tick.handler.accesses.ccm_words);
+    count("lines of code from the flash", &|tick| tick.handler.accesses.flash_lines);
+    count("words of data from the flash", &|tick| tick.handler.accesses.flash_reads);
+    count("accesses of SRAM1 and SRAM2", &|tick| tick.handler.accesses.ram_accesses);
+    count("accesses of registers", &|tick| tick.handler.accesses.register_accesses);
+    for (kind, tick) in [("while driving", driving), ("any other", other)] {
+        for (what, list) in [("code", &tick.fetched), ("data", &tick.read)] {
+            // The address stands behind the name.
+            let mut names: Vec<&str> = list.iter().filter_map(|entry| entry.split(" (0x").next()).collect();
+            names.dedup();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            println!("from the flash, {what}, {kind}: {names}");
+        }
+    }
     println!();
 }
 
