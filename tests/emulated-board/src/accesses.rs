@@ -125,7 +125,7 @@ impl Accesses {
     /// Counts a load or store of `bytes` at `address`.
     pub(crate) fn access(&mut self, address: u32, bytes: u32) {
         let parts = match bytes {
-            _ if address % bytes.max(1) == 0 => 1,
+            _ if address.is_multiple_of(bytes.max(1)) => 1,
             2 => 2,
             _ => 3,
         };

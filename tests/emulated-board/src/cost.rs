@@ -165,7 +165,7 @@ impl Before {
         match class {
             Class::Load | Class::Store | Class::StoreIndexed if !writes_back => Self::Transfer,
             // Only ADD and SUB of the stack pointer, and those of high registers, reach it.
-            Class::Plain(1) if !wide && first >> 8 != 0xb0 && first >> 10 != 0b010001 => {
+            Class::Plain(1) if !wide && first >> 8 != 0xb0 && first >> 10 != 0b01_0001 => {
                 Self::NotStackPointer
             }
             _ => Self::Anything,
@@ -237,7 +237,7 @@ pub(crate) fn block_cost(address: u32, code: &[u8]) -> BlockCost {
     while at < code.len() {
         let (first, second) = (half(at), half(at + 2));
         let (length, class) = classify(first, second);
-        let straddles = length == 4 && (address as usize + at) % 4 != 0;
+        let straddles = length == 4 && !(address as usize + at).is_multiple_of(4);
         at += length as usize;
         let single = matches!(class, Class::Load | Class::StoreIndexed | Class::Store);
         let cycles = match class {
