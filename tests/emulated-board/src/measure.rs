@@ -30,6 +30,8 @@ pub struct Measurement {
     pub cycles: Spread,
     /// The call with the largest upper bound of its cycles, where accesses are counted.
     pub worst: Option<WorstCall>,
+    /// Items that DMA moved in a call, at most, where accesses are counted.
+    pub dma_items: u64,
 }
 
 /// The call of a function with the largest upper bound of its cycles.
@@ -54,6 +56,7 @@ struct Watch {
     instructions: [u64; 3],
     cycles: [u64; 3],
     worst: Option<WorstCall>,
+    dma_items: u64,
 }
 
 /// Minimum, maximum and sum before the first call.
@@ -128,6 +131,7 @@ impl Measure {
                 instructions: NOTHING,
                 cycles: NOTHING,
                 worst: None,
+                dma_items: 0,
             });
         }
     }
@@ -137,7 +141,7 @@ impl Measure {
         for watch in &mut self.watches {
             watch.calls = 0;
             (watch.instructions, watch.cycles) = (NOTHING, NOTHING);
-            watch.worst = None;
+            (watch.worst, watch.dma_items) = (None, 0);
         }
         self.flash_blocks.clear();
         self.flash_reads.clear();
@@ -215,6 +219,7 @@ impl Measure {
         }
         if let Some(accesses) = took.accesses {
             let most_cycles = accesses.most_cycles(self.dma_items);
+            watch.dma_items = watch.dma_items.max(accesses.dma_items);
             if watch.worst.is_none_or(|worst| worst.most_cycles < most_cycles) {
                 let (instructions, least_cycles) = (took.instructions, took.cycles);
                 watch.worst = Some(WorstCall { instructions, least_cycles, most_cycles, accesses });
@@ -262,6 +267,7 @@ impl Measure {
                 instructions: spread(watch.instructions, watch.calls),
                 cycles: spread(watch.cycles, watch.calls),
                 worst: watch.worst,
+                dma_items: watch.dma_items,
             })
             .collect()
     }

@@ -46,6 +46,8 @@ pub const DMA_ITEMS_IN_A_TICK: u64 = 2 * 2 * 3;
 pub struct WorstTick {
     /// The handler of that tick.
     pub handler: WorstCall,
+    /// Items that DMA moved in a tick, at most.
+    pub dma_items: u64,
     /// Code that ticks fetched from the flash: function and address of each block.
     pub fetched: Vec<String>,
     /// Words that ticks read from the flash, and who read them.
@@ -57,9 +59,12 @@ impl WorstTick {
     pub fn since_taken(host: &Host) -> Outcome<Self> {
         let results = host.board.measurements();
         let handler = results.iter().find(|result| result.function.contains("ADC1_2"));
-        let handler = handler.and_then(|result| result.worst);
+        let counted = handler.and_then(|result| Some((result.worst?, result.dma_items)));
+        let (handler, dma_items) =
+            counted.ok_or_else(|| Failure("no tick whose accesses were counted".to_owned()))?;
         Ok(Self {
-            handler: handler.ok_or_else(|| Failure("no tick whose accesses were counted".to_owned()))?,
+            handler,
+            dma_items,
             fetched: host.board.fetched_from_flash(),
             read: host.board.read_from_flash(),
         })
@@ -70,6 +75,7 @@ impl WorstTick {
         if other.handler.most_cycles > self.handler.most_cycles {
             self.handler = other.handler;
         }
+        self.dma_items = self.dma_items.max(other.dma_items);
         self.fetched.extend(other.fetched);
         self.read.extend(other.read);
         for list in [&mut self.fetched, &mut self.read] {
