@@ -39,13 +39,14 @@ impl Terminal {
     /// # Errors
     /// [`BoardError::Terminal`] if the system has none left, or `link` exists and is no symbolic link.
     pub fn open(link: Option<&Path>) -> Result<Self, BoardError> {
-        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
+        // Not inherited: a tool that held this end would never see the other one go.
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let controller = openpt(flags).map_err(|error| failed("openpt", error))?;
         grantpt(&controller).map_err(|error| failed("grantpt", error))?;
         unlockpt(&controller).map_err(|error| failed("unlockpt", error))?;
         let name = ptsname(&controller, Vec::new()).map_err(|error| failed("ptsname", error))?;
         let path = PathBuf::from(name.to_string_lossy().into_owned());
-        let device = open(&path, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())
+        let device = open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())
             .map_err(|error| failed(&path.display().to_string(), error))?;
         let mut settings = tcgetattr(&device).map_err(|error| failed("tcgetattr", error))?;
         settings.make_raw();
