@@ -1,32 +1,29 @@
 //! `bowden monitor --foxglove`: what a client of its websocket server gets.
 
-use std::collections::HashMap;
 use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
-use std::time::Duration;
 
-use serde_json::{Value, json};
-use tungstenite::client::IntoClientRequest;
-use tungstenite::http::HeaderValue;
-use tungstenite::stream::MaybeTlsStream;
-use tungstenite::{Message, connect};
+use bowden_core::recording::{ReadOptions, Recording};
+use bowden_model::channel::Channel;
+use serde_json::Value;
 
 use crate::bowden;
 use crate::fake::Fake;
+use crate::foxglove_client::{Client, SAMPLES, address};
 use crate::mishaps::Mishaps;
 use crate::pseudo_terminal::Terminal;
 use crate::screen::Screen;
 
-/// Real time in which something has to come.
-const HANG_LIMIT: Duration = Duration::from_mins(10);
+/// A client of the server whose address stands on the screen.
+fn client(screen: &mut Screen) -> Client {
+    screen.wait_until("an address", |text| address(text).is_some());
+    Client::connect(&address(&screen.text()).unwrap())
+}
 
-/// Address that stands on the screen.
-fn address(screen: &mut Screen) -> String {
-    screen.wait_until("an address", |text| text.contains("ws://127.0.0.1:"));
-    let text = screen.text();
-    let address = text.split_whitespace().find(|word| word.starts_with("ws://")).unwrap();
-    address.to_owned()
+/// Schema of a topic's messages.
+fn schema(client: &Client, topic: &str) -> Value {
+    serde_json::from_str(client.channels[topic]["schema"].as_str().unwrap()).unwrap()
 }
 
 #[test]
@@ -35,44 +32,14 @@ fn a_client_gets_the_live_samples_that_the_layout_shows() {
     let folder = tempfile::tempdir().unwrap();
     let command = terminal.command(folder.path(), "monitor", &["--foxglove=0"]);
     let mut screen = Screen::start(&command, 100, 30);
-    let address = address(&mut screen);
-    let mut request = address.into_client_request().unwrap();
-    // The protocol that Foxglove asks for.
-    request.headers_mut().insert("Sec-WebSocket-Protocol", HeaderValue::from_static("foxglove.sdk.v1"));
-    let (mut client, _) = connect(request).unwrap();
-    // A server that falls silent fails the test instead of holding it up for ever.
-    let MaybeTlsStream::Plain(stream) = client.get_mut() else {
-        panic!("a plain connection on the loopback")
-    };
-    stream.set_read_timeout(Some(HANG_LIMIT)).unwrap();
+    let mut client = client(&mut screen);
+    assert_eq!(client.channels[SAMPLES]["encoding"], "json");
+    assert_eq!(schema(&client, SAMPLES)["properties"]["f4_n"]["description"], "N");
 
-    let mut channels: HashMap<String, Value> = HashMap::new();
-    while channels.len() < 2 {
-        if let Message::Text(text) = client.read().unwrap() {
-            let said: Value = serde_json::from_str(&text).unwrap();
-            for channel in said["channels"].as_array().into_iter().flatten() {
-                channels.insert(channel["topic"].as_str().unwrap().to_owned(), channel.clone());
-            }
-        }
-    }
-    let samples = &channels["/bowden/samples"];
-    assert_eq!(samples["encoding"], "json");
-    let schema: Value = serde_json::from_str(samples["schema"].as_str().unwrap()).unwrap();
-    assert_eq!(schema["properties"]["f4_n"]["description"], "N");
-
-    let subscription =
-        json!({ "op": "subscribe", "subscriptions": [{ "id": 7, "channelId": samples["id"] }] });
-    client.send(Message::text(subscription.to_string())).unwrap();
+    client.subscribe();
     let mut before_s = 0.0;
-    let mut got = 0;
-    while got < 50 {
-        let Message::Binary(data) = client.read().unwrap() else { continue };
-        // Opcode 1, number of the subscription, time, message.
-        if data[0] != 1 {
-            continue;
-        }
-        assert_eq!(data[1..5], 7_u32.to_le_bytes());
-        let sample: Value = serde_json::from_slice(&data[13..]).unwrap();
+    for _ in 0..50 {
+        let sample = client.sample();
         // By hand from codes and parameters of the fake, as the recording has them.
         let close = |name: &str, expected: f64| {
             assert!((sample[name].as_f64().unwrap() - expected).abs() < 1e-6, "{name}: {sample}");
@@ -85,9 +52,7 @@ fn a_client_gets_the_live_samples_that_the_layout_shows() {
         let t_s = sample["t_s"].as_f64().unwrap();
         assert!(t_s > before_s + 0.9e-3, "{t_s} after {before_s}");
         before_s = t_s;
-        got += 1;
     }
-    drop(client);
 
     let layout = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/foxglove-layout.json");
     let layout: Value = serde_json::from_str(&fs::read_to_string(layout).unwrap()).unwrap();
@@ -95,16 +60,61 @@ fn a_client_gets_the_live_samples_that_the_layout_shows() {
     let mut shown = 0;
     for path in panels.values().flat_map(|panel| panel["paths"].as_array().unwrap()) {
         let (topic, field) = path["value"].as_str().unwrap().split_once('.').unwrap();
-        let schema: Value = serde_json::from_str(channels[topic]["schema"].as_str().unwrap()).unwrap();
-        assert!(schema["properties"][field].is_object(), "{topic} {field}");
+        assert!(schema(&client, topic)["properties"][field].is_object(), "{topic} {field}");
         shown += 1;
     }
+    drop(client);
     assert!(shown >= 15, "{shown}");
     let tree = layout["layout"].to_string();
     assert!(panels.keys().all(|panel| tree.contains(&format!("\"{panel}\""))), "{tree}");
 
     screen.press("q");
     assert_eq!(screen.end(), (0, String::new()));
+}
+
+#[test]
+fn a_client_sees_the_simulated_joint_move_as_it_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["monitor", "--port", "sim", "--foxglove=0", "--record", "a.csv"];
+    let course = ["--reference", "sine", "--amplitude", "0.2", "--frequency", "1"];
+    let command = crate::command(folder.path(), &[&arguments[..], &course].concat());
+    let mut screen = Screen::start(&command, 100, 30);
+    let mut client = client(&mut screen);
+    client.subscribe();
+    screen.press("a");
+    screen.wait_for("ARMED");
+    screen.press("r");
+    // A client that is slow misses samples: it looks until it has seen both turns of the sine.
+    let mut samples = Vec::new();
+    let mut seen = [0.0_f64; 2];
+    while seen[0] > -0.15 || seen[1] < 0.15 {
+        let sample = client.sample();
+        let angle = sample["theta_out_rad"].as_f64().unwrap();
+        seen = [seen[0].min(angle), seen[1].max(angle)];
+        samples.push(sample);
+        assert!(!screen.has_ended() && samples.len() < 600_000, "{seen:?}");
+    }
+    drop(client);
+    screen.press(" ");
+    screen.wait_for("stopped");
+    screen.press("q");
+    assert_eq!(screen.end(), (0, String::new()));
+
+    let recording = Recording::load(&folder.path().join("a.csv"), &ReadOptions::default()).unwrap();
+    let mut before_s = -1.0;
+    for sample in &samples {
+        let t_s = sample["t_s"].as_f64().unwrap();
+        assert!(t_s > before_s, "{t_s} after {before_s}");
+        before_s = t_s;
+        let row = recording.t_s().partition_point(|recorded_s| *recorded_s < t_s - 5e-5);
+        assert!((recording.t_s()[row] - t_s).abs() < 1e-8, "{sample}");
+        for channel in [Channel::ThetaOut, Channel::F1, Channel::F4, Channel::MotorCurrent] {
+            let recorded = recording.channel(channel).unwrap()[row];
+            let shown = sample[channel.role()].as_f64().unwrap();
+            assert!((shown - recorded).abs() < 1e-6, "{}: {recorded} recorded, {sample}", channel.role());
+        }
+    }
+    assert!(seen[0] > -0.25 && seen[1] < 0.25, "{seen:?}");
 }
 
 #[test]

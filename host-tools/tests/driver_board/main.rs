@@ -10,8 +10,13 @@ mod client;
 mod common;
 mod cuts;
 mod evidence;
+mod excitation;
+#[path = "../common/excitation.rs"]
+mod excitation_compared;
 mod fake;
 mod foxglove;
+#[path = "../common/foxglove.rs"]
+mod foxglove_client;
 mod from_rig;
 mod mishaps;
 mod monitor;

@@ -38,7 +38,7 @@ pub struct Options {
 const CORRECTIONS: &str = "host-tools/docs/corrections.md";
 
 /// Benchmarks: package, target, and what its figures say.
-const BENCHES: [(&str, &str, &str); 5] = [
+const BENCHES: [(&str, &str, &str); 6] = [
     (
         "bowden-model",
         "joint",
@@ -54,6 +54,11 @@ const BENCHES: [(&str, &str, &str); 5] = [
         "bowden",
         "link",
         "the link: full rate over a pseudo terminal, decoding, MCAP, the monitor's share of a core",
+    ),
+    (
+        "bowden",
+        "excitation",
+        "excitations: what chosen motions tell of a rig's parameters, beside plain motions of the same length",
     ),
     ("bowden-tests", "diagnosis", "diagnosis: time by stage, from 40 s at 1 kHz"),
 ];
