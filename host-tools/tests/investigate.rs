@@ -1,6 +1,9 @@
 //! `bowden investigate` from end to end on the simulated board, whose joint is the virtual bench; in virtual time.
 
 mod common;
+#[path = "common/screen.rs"]
+#[expect(dead_code, reason = "another part of it is for the tests of the monitor")]
+mod screen;
 
 use std::cell::Cell;
 use std::collections::BTreeSet;
@@ -17,7 +20,8 @@ use bowden_host_link::investigate::limits::Wishes;
 use bowden_host_link::investigate::{Dialog, Setup, investigate};
 use bowden_host_link::sim::SimTransport;
 use bowden_host_link::{Client, Transport};
-use common::bowden;
+use common::{bowden, command};
+use screen::Screen;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -143,6 +147,47 @@ fn nothing_moves_where_nobody_can_be_asked() {
     assert_eq!((status, stdout.as_str(), stderr.lines().count()), (2, "", 1), "{stderr}");
     assert!(stderr.starts_with("bowden: --json: nobody can be asked"), "{stderr}");
     assert_eq!(names(folder.path()), BTreeSet::from(["rig.toml".to_owned()]));
+}
+
+#[test]
+fn a_person_at_the_terminal_is_asked_before_the_joint_moves_and_before_it_is_changed() {
+    let folder = folder();
+    let port = "sim:motor_coulomb_friction:1,seed=3";
+    let line = [
+        "investigate",
+        "--port",
+        port,
+        "--rig",
+        "rig.toml",
+        "--out",
+        "out",
+        "--angle",
+        "0.4",
+        "--time",
+        "42",
+    ];
+    let asked = |answer: &str| {
+        let mut screen = Screen::start(&command(folder.path(), &line), 120, 40);
+        screen.wait_for("Move the joint along these references? [y/N]");
+        screen.press(answer);
+        screen
+    };
+    for (answer, expected) in
+        [("\r", "not confirmed: nothing was moved and nothing was written"), ("\u{3}", "stopped by the user")]
+    {
+        let (status, stderr) = asked(answer).end();
+        assert_eq!((status, stderr), (1, format!("bowden: {expected}\n")));
+        assert_eq!(names(folder.path()).len(), 1, "{expected}");
+    }
+    let mut screen = asked("y\r");
+    screen.wait_for("on the board? [y/N]");
+    assert!(screen.text().contains("correction.motor_friction.enable"), "{}", screen.text());
+    screen.press("n\r");
+    let (status, stderr) = screen.end();
+    assert_eq!((status, stderr.as_str()), (0, ""), "{}", screen.text());
+    let result = result(folder.path());
+    assert_eq!(result["parameters"]["state"], "declined", "{}", result["parameters"]);
+    assert_eq!(result["verification"]["after_rms_rad"], Value::Null);
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! The host tool `bowden`, run against the pseudo terminal of an emulated board.
 
 use std::env;
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::mpsc;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use bowden_board::{Board, Terminal};
@@ -56,20 +57,75 @@ pub fn tool() -> Outcome<PathBuf> {
 pub struct Plugged {
     /// The board.
     pub board: Board,
-    terminal: Terminal,
+    /// None while the plug is pulled.
+    terminal: Option<Terminal>,
+    port: PathBuf,
+    /// Name of the port that stays when it is plugged in again.
+    link: Option<PathBuf>,
+}
+
+/// A tool that runs.
+pub struct Running {
+    what: String,
+    process: u32,
+    waiting: JoinHandle<io::Result<Output>>,
+}
+
+impl Running {
+    /// Whether it has ended.
+    pub fn has_ended(&self) -> bool {
+        self.waiting.is_finished()
+    }
+
+    /// Ctrl-C.
+    pub fn interrupt(&self) -> Outcome {
+        let process = self.process.to_string();
+        match Command::new("kill").args(["-INT", &process]).status() {
+            Ok(status) if status.success() => Ok(()),
+            other => fail(format!("kill -INT {process}: {other:?}")),
+        }
+    }
 }
 
 impl Plugged {
     /// Plugs `board` in and lets it be enumerated.
-    pub fn new(mut board: Board) -> Outcome<Self> {
-        let terminal = Terminal::open(None)?;
+    pub fn new(board: Board) -> Outcome<Self> {
+        Self::plugged(board, None)
+    }
+
+    /// The same under the name `link`, by which the port is found again after it was unplugged.
+    pub fn linked(board: Board, link: PathBuf) -> Outcome<Self> {
+        Self::plugged(board, Some(link))
+    }
+
+    fn plugged(mut board: Board, link: Option<PathBuf>) -> Outcome<Self> {
+        let terminal = Terminal::open(link.as_deref())?;
         board.run_until("USB port", |board| board.usb_ready(), 1.0)?;
-        Ok(Self { board, terminal })
+        let port = link.clone().unwrap_or_else(|| terminal.path().to_owned());
+        Ok(Self { board, terminal: Some(terminal), port, link })
     }
 
     /// Name of the port.
     pub fn port(&self) -> String {
-        self.terminal.path().to_string_lossy().into_owned()
+        self.port.to_string_lossy().into_owned()
+    }
+
+    /// Pulls the plug; the board keeps its supply.
+    pub fn unplug(&mut self) {
+        self.terminal = None;
+        self.board.set_usb_plugged(false);
+    }
+
+    /// Plugs the board in again, as another device under the same link.
+    pub fn replug(&mut self) -> Outcome {
+        self.board.set_usb_plugged(true);
+        self.board.run_until("USB port", |board| board.usb_ready(), 1.0)?;
+        let terminal = Terminal::open(self.link.as_deref())?;
+        if self.link.is_none() {
+            terminal.path().clone_into(&mut self.port);
+        }
+        self.terminal = Some(terminal);
+        Ok(())
     }
 
     /// Arguments of `bowden` that begin a command with this board: `<command> --port <terminal> --timeout 600`.
@@ -122,22 +178,38 @@ impl Plugged {
         line: &[&str],
         act: impl FnMut(&mut Board),
     ) -> Outcome<Ran> {
+        let running = self.start(folder.unwrap_or(Path::new(".")), line)?;
+        self.finish_beside(running, act)
+    }
+
+    /// Starts `bowden <line>`, which names the port itself, in `folder`.
+    pub fn start(&self, folder: &Path, line: &[&str]) -> Outcome<Running> {
         let path = tool()?;
         let what = format!("{} {}", path.display(), line.join(" "));
-        let failed = |error: std::io::Error| Failure(format!("{what}: {error}"));
         let child = Command::new(&path)
             .args(line)
-            .current_dir(folder.unwrap_or(Path::new(".")))
+            .current_dir(folder)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .map_err(failed)?;
+            .map_err(|error| Failure(format!("{what}: {error}")))?;
+        let process = child.id();
         // Another thread reads what it prints, so that it never waits for us.
-        let waiting = std::thread::spawn(move || child.wait_with_output());
-        self.attend_beside(&what, || waiting.is_finished(), act)?;
-        let output = waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
-        let output = output.map_err(failed)?;
+        Ok(Running { what, process, waiting: std::thread::spawn(move || child.wait_with_output()) })
+    }
+
+    /// Lets the board run until `running` has ended.
+    pub fn finish(&mut self, running: Running) -> Outcome<Ran> {
+        self.finish_beside(running, |_| ())
+    }
+
+    fn finish_beside(&mut self, running: Running, act: impl FnMut(&mut Board)) -> Outcome<Ran> {
+        self.attend_beside(&running.what, || running.has_ended(), act)?;
+        let what = &running.what;
+        let output =
+            running.waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
+        let output = output.map_err(|error| Failure(format!("{what}: {error}")))?;
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         Ok(Ran { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) })
     }
@@ -228,13 +300,17 @@ impl Plugged {
         let mut allowed_until_s = self.board.time_s();
         let mut heard = Instant::now();
         while !is_done() {
-            if self.terminal.exchange(&mut self.board)? > 0 {
+            let received = match &mut self.terminal {
+                Some(terminal) => terminal.exchange(&mut self.board)?,
+                None => 0,
+            };
+            if received > 0 {
                 heard = Instant::now();
                 allowed_until_s = self.board.time_s() + TIME_PER_REQUEST_S;
             }
             // Without a port the board cannot be asked, and is on the way to one.
             let allowed = self.board.time_s() < allowed_until_s || !self.board.usb_ready();
-            if allowed && !self.terminal.is_full() {
+            if allowed && !self.terminal.as_ref().is_some_and(Terminal::is_full) {
                 act(&mut self.board);
                 self.board.run_for(LOOK_S)?;
             } else {

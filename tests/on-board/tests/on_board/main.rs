@@ -17,6 +17,9 @@ mod faults;
 mod first_hour;
 mod flash;
 mod flash_over_usb;
+#[path = "../../../../host-tools/tests/common/foxglove.rs"]
+mod foxglove_client;
+mod investigate;
 mod load;
 mod log;
 mod modes;
@@ -25,6 +28,7 @@ mod motor_lead;
 mod moved_sheath;
 mod parameters;
 mod replay_control;
+mod replug;
 mod ripple_table;
 mod run;
 #[path = "../../../../host-tools/tests/common/screen.rs"]
