@@ -125,10 +125,12 @@ pub fn carry_out(
             Err(failure) => {
                 // Over a broken link this fails too, and the board stops by itself: what ended the step is what there is to say.
                 let _ = session.off();
+                let is_in_fault = session.client().status().is_ok_and(|status| status.fault.is_some());
                 return Err(failure.with_note(&format!(
-                    "{} of {} steps are done; the same command goes on with {}",
+                    "{} of {} steps are done; {}the same command goes on with {}",
                     ledger.done().len(),
                     items.len(),
+                    if is_in_fault { "after `bowden faults --clear` " } else { "" },
                     item.name
                 )));
             }

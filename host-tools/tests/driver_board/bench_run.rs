@@ -127,7 +127,12 @@ fn a_run_that_a_fault_stopped_goes_on_where_it_was() {
         stderr.contains("a tendon is slack") && stderr.contains("rows are kept in out/02-hold.stopped-1.csv"),
         "{stderr}"
     );
-    assert!(stderr.ends_with("1 of 2 steps are done; the same command goes on with 02-hold\n"), "{stderr}");
+    assert!(
+        stderr.ends_with(
+            "1 of 2 steps are done; after `bowden faults --clear` the same command goes on with 02-hold\n"
+        ),
+        "{stderr}"
+    );
     assert_eq!(ledger(folder.path()), [("01-home".to_owned(), 0)]);
     let stopped =
         Recording::load(&folder.path().join("out/02-hold.stopped-1.csv"), &ReadOptions::default()).unwrap();

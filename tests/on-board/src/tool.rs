@@ -90,15 +90,15 @@ impl Running {
 impl Plugged {
     /// Plugs `board` in and lets it be enumerated.
     pub fn new(board: Board) -> Outcome<Self> {
-        Self::plugged(board, None)
+        Self::with_link(board, None)
     }
 
     /// The same under the name `link`, by which the port is found again after it was unplugged.
     pub fn linked(board: Board, link: PathBuf) -> Outcome<Self> {
-        Self::plugged(board, Some(link))
+        Self::with_link(board, Some(link))
     }
 
-    fn plugged(mut board: Board, link: Option<PathBuf>) -> Outcome<Self> {
+    fn with_link(mut board: Board, link: Option<PathBuf>) -> Outcome<Self> {
         let terminal = Terminal::open(link.as_deref())?;
         board.run_until("USB port", |board| board.usb_ready(), 1.0)?;
         let port = link.clone().unwrap_or_else(|| terminal.path().to_owned());
