@@ -16,19 +16,29 @@ unsafe extern "C" {
 
 /// Fills it; to be called once, before anything of it is used.
 pub fn fill() {
+    fill_code();
+    #[expect(unsafe_code, reason = "memory without a variable yet")]
+    // Safety: the linker script has both bounds as words of memory behind the code; no variable in it is used yet.
+    unsafe {
+        let mut place = addr_of!(_eccm).cast_mut();
+        while place.cast_const() < addr_of!(_ccm_end) {
+            place.write_volatile(0);
+            place = place.add(1);
+        }
+    }
+}
+
+/// Fills the code alone, also a second time. What ends a start before [`fill`] was through needs `memcpy`, which is there.
+pub fn fill_code() {
     #[expect(unsafe_code, reason = "code is copied to where it runs")]
-    // Safety: the linker script has all bounds as words of memory that nothing else uses, the copy as long as the code; no function
-    // and no variable in it is used yet.
+    // Safety: the linker script has all bounds as words of memory that nothing else uses, the copy as long as the code. Code that may run
+    // meanwhile is overwritten with itself.
     unsafe {
         let mut place = addr_of_mut!(_sccm);
         let mut from = addr_of!(_ccm_load);
         while place.cast_const() < addr_of!(_eccm) {
             place.write_volatile(from.read_volatile());
             (place, from) = (place.add(1), from.add(1));
-        }
-        while place.cast_const() < addr_of!(_ccm_end) {
-            place.write_volatile(0);
-            place = place.add(1);
         }
     }
     // What was written is code from now on.

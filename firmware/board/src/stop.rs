@@ -9,7 +9,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
 
-use crate::{bridge, retained, store_flash};
+use crate::{bridge, ccm, retained, store_flash};
 
 // Microseconds since the start; 0 before the timer that counts them has its clock, for what ends a run that early is logged too.
 defmt::timestamp!("{=u64:us}", {
@@ -30,9 +30,15 @@ fn reset_with(fault: Fault) -> ! {
     SCB::sys_reset()
 }
 
+/// Opens the bridge, and makes the code whole that keeping and logging a fault need: the start may not have come to it.
+fn make_safe() {
+    bridge::off();
+    ccm::fill_code();
+}
+
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    bridge::off();
+    make_safe();
     cortex_m::interrupt::disable();
     if LOGGED.load(Ordering::Relaxed) {
         // While the end was logged. What is kept says why it came to that.
@@ -78,14 +84,14 @@ unsafe extern "C" fn hard_fault() -> ! {
 
 /// The stack is at its end, or so near that nothing more fits; it is taken anew from its start.
 extern "C" fn stack_overflow(stack_pointer: u32) -> ! {
-    bridge::off();
+    make_safe();
     retained::keep(Fault::StackOverflow, format_args!("stack pointer {stack_pointer:#010x}"));
     cortex_m::interrupt::disable();
     reset_with(Fault::StackOverflow)
 }
 
 extern "C" fn processor_fault(frame: &ExceptionFrame) -> ! {
-    bridge::off();
+    make_safe();
     #[allow(unsafe_code, reason = "a register of the core")]
     // Safety: reading it changes nothing.
     let status = unsafe { (*SCB::PTR).cfsr.read() };
@@ -107,13 +113,13 @@ unsafe fn NonMaskableInt() {
     }
     let check = pac::FLASH.eccr().read();
     if check.eccd() {
-        bridge::off();
+        make_safe();
         let bank = if check.bk_ecc() { 2 } else { 1 };
         retained::keep(Fault::FlashDamaged, format_args!("bank {bank}, {:#x}", check.addr_ecc()));
         reset_with(Fault::FlashDamaged);
     }
     if pac::RCC.cifr().read().cssf() {
-        bridge::off();
+        make_safe();
         retained::keep(Fault::ClockFailed, format_args!(""));
         // At 170 MHz no tick would be in time again; the next start finds out what runs.
         reset_with(Fault::ClockFailed);

@@ -165,6 +165,8 @@ impl Cpu {
         for register in [R::PRIMASK, R::FAULTMASK, R::BASEPRI, R::CONTROL, R::FPSCR, R::IPSR] {
             self.uc.reg_write(register, 0)?;
         }
+        // A reset inside an IT block leaves none behind (Armv7-M, B1.5.5).
+        self.uc.reg_write(R::EPSR, THUMB)?;
         let (stack, entry) = (read_word(&self.uc, FLASH.start)?, read_word(&self.uc, FLASH.start + 4)?);
         self.uc.reg_write(R::LR, 0xffff_ffff)?;
         self.uc.reg_write(R::SP, u64::from(stack))?;
