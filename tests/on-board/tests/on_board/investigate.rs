@@ -26,7 +26,7 @@ fn begun(board: &mut Plugged, place: &Path) -> Outcome<Screen> {
     let line = ["investigate", "--port", "port", "--timeout", "600", "--rig", "rig.toml", "--out", "out"];
     let mut screen = in_terminal(place, &[&line[..], &["--angle", "0.4", "--time", "42"]].concat())?;
     let asked = ["Move the joint along these references? [y/N]", "limits of the references: angle -0.4"];
-    await_all(board, &mut screen, &asked)?;
+    await_all(board, &mut screen, &asked);
     assert!(!place.join("out").exists() && board.board.pwm().duty.is_none());
     Ok(screen)
 }
@@ -43,7 +43,7 @@ fn friction_is_found_and_made_up_for_on_the_board() -> Outcome {
     let mut board = with_friction(place)?;
     let mut screen = begun(&mut board, place)?;
     screen.press("y\r");
-    await_all(&mut board, &mut screen, &["on the board? [y/N]"])?;
+    await_all(&mut board, &mut screen, &["on the board? [y/N]"]);
     screen.press("y\r");
     board.attend("the end", || screen.has_ended())?;
     let (status, errors) = screen.end();

@@ -19,7 +19,7 @@ pub fn in_terminal(folder: &Path, line: &[&str]) -> Outcome<Screen> {
 }
 
 /// Lets the board run until all of `wanted` stand on the screen: a picture comes in pieces, one look has to find everything.
-pub fn await_all(board: &mut Plugged, screen: &mut Screen, wanted: &[&str]) -> Outcome {
+pub fn await_all(board: &mut Plugged, screen: &mut Screen, wanted: &[&str]) {
     let mut text = String::new();
     let mut is_whole = false;
     let waited = board.attend(wanted[0], || {
@@ -28,7 +28,6 @@ pub fn await_all(board: &mut Plugged, screen: &mut Screen, wanted: &[&str]) -> O
         is_whole || screen.has_ended()
     });
     assert!(is_whole, "{waited:?}: {wanted:?} are not all on the screen:\n{text}");
-    Ok(())
 }
 
 /// Times and states of a recording.
@@ -59,7 +58,7 @@ fn the_joint_is_watched_armed_run_and_stopped_by_keys() -> Outcome {
     ];
     for (awaited, keys) in steps {
         let wanted = [awaited, "no fault", "  lost 0 (by the board 0)  damaged 0  late 0"];
-        await_all(&mut board, &mut screen, &wanted)?;
+        await_all(&mut board, &mut screen, &wanted);
         screen.press(keys);
     }
     board.attend("the end", || screen.has_ended())?;
@@ -85,7 +84,7 @@ fn a_client_of_foxglove_gets_what_the_joint_does() -> Outcome {
     let mut line: Vec<&str> = line.iter().map(String::as_str).collect();
     line.push("--foxglove=0");
     let mut screen = in_terminal(folder.path(), &line)?;
-    await_all(&mut board, &mut screen, &["ws://127.0.0.1:", "nucleo-g474re"])?;
+    await_all(&mut board, &mut screen, &["ws://127.0.0.1:", "nucleo-g474re"]);
     let address = address(&screen.text()).expect("an address");
     let client = std::thread::spawn(move || -> Vec<Value> {
         let mut client = Client::connect(&address);
