@@ -71,10 +71,10 @@ impl Policy {
         before - after > self.name_loss && before - after > share * before
     }
 
-    /// The same for an error of a sensor that its own channel cannot distinguish from a change of parameters: it must reach the share of a
-    /// law.
+    /// The same where the reduction may have another cause: for an error of a sensor that its own channel cannot distinguish from a change
+    /// of parameters, and for an effect beside a law whose form may be right only roughly. It must reach the share of a law.
     #[must_use]
-    pub fn worth_naming_untold(&self, before: f64, after: f64) -> bool {
+    pub fn worth_naming_in_doubt(&self, before: f64, after: f64) -> bool {
         self.worth_naming(before, after) && before - after > self.law_share * before
     }
 
@@ -195,7 +195,7 @@ mod tests {
         for (before, after, named) in
             [(2.85, 2.3, false), (0.84, 0.38, true), (0.7, 0.35, true), (0.15, 0.08, false)]
         {
-            assert_eq!(POLICY.worth_naming_untold(before, after), named, "{before} to {after}");
+            assert_eq!(POLICY.worth_naming_in_doubt(before, after), named, "{before} to {after}");
         }
         assert!(!POLICY.worth_stating(0.7, 0.35));
     }

@@ -211,10 +211,10 @@ pub fn select(
     let nothing = present.clone();
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut rounds = Vec::new();
-    search.add_names(&mut present, &mut chosen, &mut rounds)?;
+    search.add_names(&mut present, &mut chosen, &mut rounds, Policy::worth_naming)?;
     search.begin_again(&nothing, &mut present, &mut chosen, &mut rounds)?;
     if search.law_in_place_of_names(&nothing, &mut present, &mut chosen, &mut rounds)? {
-        search.add_names(&mut present, &mut chosen, &mut rounds)?;
+        search.add_names(&mut present, &mut chosen, &mut rounds, Policy::worth_naming)?;
     }
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
     search.compare_with_laws(&mut present, &mut chosen, &mut rounds)?;
@@ -363,18 +363,19 @@ impl Search<'_> {
         Ok((baseline, self.with_ordinary(plain)?))
     }
 
-    /// Adds effects one by one while one reaches the threshold, and removes those that later ones make superfluous.
+    /// Adds effects one by one while one reaches the threshold `worth`, and removes those that later ones make superfluous.
     fn add_names(
         &self,
         present: &mut Fitted,
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
+        worth: Worth,
     ) -> Result<(), Failure> {
         while names(chosen) < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(present)?;
             let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
-            let Some((found, with)) = self.found(&before, present, fits, Policy::worth_naming)? else {
+            let Some((found, with)) = self.found(&before, present, fits, worth)? else {
                 break;
             };
             chosen.push(found);

@@ -4,7 +4,7 @@
 //! square of the load, for example, without the dry friction next to it. A large remaining loss is the sign of it.
 
 use super::{Attempted, Chosen, Fitted, PROMISING, Round, Search, Tried, handicap};
-use crate::diagnose::policy::POLICY;
+use crate::diagnose::policy::{POLICY, Policy};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
@@ -57,7 +57,7 @@ impl Search<'_> {
                 compared: [nothing, &other].map(|fitted| fitted.solution.model.clone()),
                 others,
             }];
-            self.add_names(&mut other, &mut others_chosen, rounds)?;
+            self.add_names(&mut other, &mut others_chosen, rounds, Policy::worth_naming)?;
             if best.as_ref().is_none_or(|(best, _)| other.loss < best.loss) {
                 best = Some((other, others_chosen));
             }

@@ -91,7 +91,7 @@ impl Search<'_> {
             *present = with;
             self.prune(present, chosen)?;
             // Beside the law an effect may show that is worth little without it.
-            self.add_names(present, chosen, rounds)?;
+            self.add_names(present, chosen, rounds, Policy::worth_naming_in_doubt)?;
         }
         Ok(())
     }

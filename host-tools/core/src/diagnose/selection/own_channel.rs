@@ -29,7 +29,7 @@ impl Search<'_> {
     ) -> Result<bool, Failure> {
         let effect = &with.solution.model.effects[place];
         let told = effect.descriptor().component != Component::Sensors
-            || POLICY.worth_naming_untold(without.loss, with.loss)
+            || POLICY.worth_naming_in_doubt(without.loss, with.loss)
             || self.progress.interrupted();
         let left_by = |own: f64| (without.loss - own).max(0.0);
         let is_worth_a_name = |own| POLICY.worth_naming(without.loss, left_by(own));
