@@ -9,7 +9,9 @@ use bowden_model::law;
 
 use super::laws::{RIVALLING, are_of_one_sensor};
 use super::loudest::without_the_loudest;
-use super::{Chosen, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, remove};
+use super::{
+    Chosen, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, negligible, remove,
+};
 use crate::diagnose::candidates::Candidate;
 use crate::diagnose::law_candidates::law_candidates;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -30,8 +32,11 @@ impl Search<'_> {
             }
             let places: Vec<usize> =
                 (0..chosen.len()).filter(|place| group.contains(&chosen[*place].effect)).collect();
-            // A law may have replaced one of them together with others.
-            if places.len() == group.len() {
+            let fitted =
+                |place: &usize| &present.solution.model.effects[present.layout.first_found() + place];
+            let is_ordinary = |place: &usize| negligible(self.objective, self.believed, fitted(place));
+            // A law may have replaced one of them together with others. What an ordinary bench has is reported as neither.
+            if places.len() == group.len() && !places.iter().all(is_ordinary) {
                 replaced |= self.compare_one(&places, present, chosen, rounds)?;
             }
         }
