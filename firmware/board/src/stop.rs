@@ -30,16 +30,17 @@ fn reset_with(fault: Fault) -> ! {
     SCB::sys_reset()
 }
 
-/// Opens the bridge, and makes the code whole that keeping and logging a fault need: the start may not have come to it.
+/// Opens the bridge, lets nothing close it again, and makes the code whole that keeping and logging a fault need: the start may not have
+/// come to it.
 fn make_safe() {
     bridge::off();
+    cortex_m::interrupt::disable();
     ccm::fill_code();
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     make_safe();
-    cortex_m::interrupt::disable();
     if LOGGED.load(Ordering::Relaxed) {
         // While the end was logged. What is kept says why it came to that.
         SCB::sys_reset();
@@ -86,7 +87,6 @@ unsafe extern "C" fn hard_fault() -> ! {
 extern "C" fn stack_overflow(stack_pointer: u32) -> ! {
     make_safe();
     retained::keep(Fault::StackOverflow, format_args!("stack pointer {stack_pointer:#010x}"));
-    cortex_m::interrupt::disable();
     reset_with(Fault::StackOverflow)
 }
 
@@ -99,7 +99,6 @@ extern "C" fn processor_fault(frame: &ExceptionFrame) -> ! {
         Fault::HardFault,
         format_args!("at {:#010x}, called from {:#010x}, CFSR {status:#010x}", frame.pc(), frame.lr()),
     );
-    cortex_m::interrupt::disable();
     reset_with(Fault::HardFault)
 }
 
