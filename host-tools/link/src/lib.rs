@@ -70,7 +70,7 @@ use calibrate::hand::{Hand, Person};
 pub use client::{Client, Telemetry};
 pub use error::{CommsError, LinkError};
 pub use losses::Losses;
-pub use parameters::ParameterSet;
+pub use parameters::{ParameterSet, Unnoticed};
 pub use session::{RunEnd, RunTick, Session};
 pub use transport::Transport;
 

@@ -29,6 +29,15 @@ pub const PARAMETER_SCHEMA: &str = "bowden-parameters/1";
 /// Keys of a file that are no parameters.
 const HEADER: [&str; 4] = ["schema", "firmware", "board", "clock"];
 
+/// What a set of parameters keeps the board from noticing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unnoticed {
+    /// What it is.
+    pub found: String,
+    /// What to change.
+    pub next: &'static str,
+}
+
 /// All parameters of a board, and what it calls itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
@@ -168,15 +177,16 @@ impl ParameterSet {
         parameters
     }
 
-    /// What this set keeps the board from noticing, in one line; `None` if nothing, or if the board refuses the set anyway.
-    pub fn warning(&self) -> Option<String> {
+    /// What this set keeps the board from noticing; `None` if nothing, or if the board refuses the set anyway.
+    pub fn unnoticed(&self) -> Option<Unnoticed> {
         let lead = OpenLead::of(&self.control()).ok().filter(|lead| !lead.is_named())?;
         let OpenLead { reached_v, needed_v, bus_v } = lead;
-        Some(format!(
-            "warning: an open motor lead can go unnoticed: motor.resistance times limits.current gives {reached_v:.1} V at a bus \
-             of {bus_v:.0} V, fault 25 needs more than {needed_v:.1} V; raise limits.current, or lower supervisor.rest_current \
-             or correction.dead_zone.limit"
-        ))
+        let found = format!(
+            "an open motor lead can go unnoticed: motor.resistance times limits.current gives {reached_v:.1} V at a bus of \
+             {bus_v:.0} V, fault 25 needs more than {needed_v:.1} V"
+        );
+        let next = "raise limits.current, or lower supervisor.rest_current or correction.dead_zone.limit";
+        Some(Unnoticed { found, next })
     }
 
     /// The set with other values for some parameters.

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use bowden_core::outcome::{Failure, Outcome};
 use bowden_host_link::serial::{USB_PRODUCT, USB_VENDOR, udev_rule};
-use bowden_host_link::{Client, ParameterSet};
+use bowden_host_link::{Client, ParameterSet, Unnoticed};
 use serde::Serialize;
 
 use super::port::timeout;
@@ -178,10 +178,8 @@ fn board(port: &str, timeout: Duration) -> Vec<Check> {
     let mut checks = vec![state(&mut client)];
     // A board that does not answer was named.
     if let Ok(parameters) = ParameterSet::read(&mut client)
-        && let Some(warning) = parameters.warning()
+        && let Some(Unnoticed { found, next }) = parameters.unnoticed()
     {
-        let (found, next) = warning.rsplit_once("; ").unwrap_or((&warning, ""));
-        let found = found.strip_prefix("warning: ").unwrap_or(found);
         checks.push(Check::new("parameters", Grade::Hint, found, next));
     }
     checks

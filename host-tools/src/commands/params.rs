@@ -9,7 +9,7 @@ use bowden_core::outcome::{Failure, Outcome};
 use bowden_core::output;
 use bowden_core::rig::Rig;
 use bowden_host_link::from_rig::Transfer;
-use bowden_host_link::{Client, ParameterSet};
+use bowden_host_link::{Client, ParameterSet, Unnoticed};
 use serde::Serialize;
 use table::TableArguments;
 
@@ -141,8 +141,8 @@ impl FromRig {
 
 /// Says on stderr what a set of parameters keeps the board from noticing; the exit status stays.
 fn warn(parameters: &ParameterSet) {
-    if let Some(warning) = parameters.warning() {
-        say(&warning);
+    if let Some(Unnoticed { found, next }) = parameters.unnoticed() {
+        say(&format!("warning: {found}; {next}"));
     }
 }
 
