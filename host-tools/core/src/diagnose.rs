@@ -57,7 +57,7 @@ use hum::Hum;
 pub use hypotheses::Asked;
 use layout::Layout;
 use policy::POLICY;
-use selection::{Attempted, Chosen, Round, Selected, Tried, select};
+use selection::{Attempted, Chosen, Round, Selected, Tried, compare_with_laws, select};
 use stages::{Stage, Stages};
 use verdict::{
     Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, OrdinaryEffect, Recalibrated,
@@ -222,17 +222,29 @@ impl Case<'_> {
     /// The whole diagnosis.
     fn diagnosed(&self, asked: &Asked, progress: &dyn Progress) -> Result<Diagnosed, Failure> {
         let Self { objective, judge, model, .. } = *self;
-        let mut selected = select(objective, &at_search_resolution(model, model), asked, progress)?;
+        let coarse = at_search_resolution(model, model);
+        let mut selected = select(objective, &coarse, asked, progress)?;
         let before = Stage::of(judge, model)?;
         progress.stage("refining", 0);
         let rounds: &[f64] = if selected.complete && !self.tensions_unseen() { &[FINE_STEP] } else { &[] };
         let refined =
             |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
-        let mut last = refined(&selected.model)?;
-        while let Some(fewer) = selected.complete.then(|| selected.without_faded(objective, &last)).flatten()
-        {
-            selected = fewer;
-            last = refined(&selected.model)?;
+        let unfaded = |mut selected: Selected| {
+            let mut last = refined(&selected.model)?;
+            while let Some(fewer) =
+                selected.complete.then(|| selected.without_faded(objective, &last)).flatten()
+            {
+                selected = fewer;
+                last = refined(&selected.model)?;
+            }
+            Ok::<_, Failure>((selected, last))
+        };
+        let mut last;
+        (selected, last) = unfaded(selected)?;
+        let found = selected.model.clone();
+        selected = compare_with_laws(objective, &coarse, asked, progress, selected)?;
+        if selected.model != found {
+            (selected, last) = unfaded(selected)?;
         }
         let recalibrated = Stage::of(judge, &at_full_resolution(&selected.baseline.model, model))?;
         if selected.complete

@@ -100,6 +100,18 @@ pub struct Chosen {
 }
 
 impl Chosen {
+    /// The effect that was added last to `with`, compared with `without`.
+    fn newest_of(with: &Fitted, without: &Fitted, others: Vec<Tried>) -> Self {
+        Self {
+            effect: with.newest(),
+            model: with.without_ordinary(),
+            loss_before: without.loss,
+            loss_after: with.loss,
+            compared: [without, with].map(|fitted| fitted.solution.model.clone()),
+            others,
+        }
+    }
+
     /// Replaces the effect by `other` and removes that from its rivals.
     fn becomes(&mut self, other: ActiveEffect) {
         self.others.retain(|tried| !tried.effect.is_beside(&other));
@@ -217,13 +229,8 @@ pub fn select(
         search.add_names(&mut present, &mut chosen, &mut rounds, Policy::worth_naming)?;
     }
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
-    search.compare_with_laws(&mut present, &mut chosen, &mut rounds)?;
     let trials = search.trials(&nothing)?;
-    // An effect that was selected as well is not a rival.
-    let found: Vec<ActiveEffect> = chosen.iter().map(|one| one.effect).collect();
-    for one in &mut chosen {
-        one.others.retain(|tried| !found.iter().any(|found| found.is_beside(&tried.effect)));
-    }
+    without_selected_rivals(&mut chosen);
     let model = present.without_ordinary();
     let searched = present.solution.model;
     let ordinary = present.layout.ordinary(&searched).to_vec();
@@ -238,6 +245,44 @@ pub fn select(
         trials,
         complete: !progress.interrupted(),
     })
+}
+
+/// Compares the effects that `selected` names with the laws of their component. Only effects that have not faded at the rig's own resolution
+/// should be among them: a law in place of an effect that only compensates the discretisation error would do the same and not fade.
+///
+/// # Errors
+/// When the model cannot be driven.
+pub fn compare_with_laws(
+    objective: &Objective,
+    model: &JointModel,
+    asked: &Asked,
+    progress: &dyn Progress,
+    mut selected: Selected,
+) -> Result<Selected, Failure> {
+    let are_laws = selected.chosen.iter().all(|one| law::of(&one.effect).is_some());
+    if are_laws || progress.interrupted() {
+        return Ok(selected);
+    }
+    let search = Search { objective, believed: model, asked, progress };
+    let (layout, with) = Layout::of(model).with_ordinary(&selected.model);
+    let mut present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
+    let Selected { chosen, rounds, .. } = &mut selected;
+    if search.replace_by_laws(&mut present, chosen, rounds)? {
+        without_selected_rivals(chosen);
+        selected.model = present.without_ordinary();
+        selected.ordinary = present.layout.ordinary(&present.solution.model).to_vec();
+        selected.searched = present.solution.model;
+    }
+    selected.complete = !progress.interrupted();
+    Ok(selected)
+}
+
+/// Removes rivals that were selected as well.
+fn without_selected_rivals(chosen: &mut [Chosen]) {
+    let found: Vec<ActiveEffect> = chosen.iter().map(|one| one.effect).collect();
+    for one in chosen {
+        one.others.retain(|tried| !found.iter().any(|found| found.is_beside(&tried.effect)));
+    }
 }
 
 /// Losses of a round in which a nuisance term at its upper bound was left out.

@@ -49,14 +49,7 @@ impl Search<'_> {
             let mut others: Vec<Tried> = rest.map(|(_, tried)| tried.clone()).collect();
             others.extend(own.clone());
             others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-            let mut others_chosen = vec![Chosen {
-                effect: other.newest(),
-                model: other.without_ordinary(),
-                loss_before: nothing.loss,
-                loss_after: other.loss,
-                compared: [nothing, &other].map(|fitted| fitted.solution.model.clone()),
-                others,
-            }];
+            let mut others_chosen = vec![Chosen::newest_of(&other, nothing, others)];
             self.add_names(&mut other, &mut others_chosen, rounds, Policy::worth_naming)?;
             if best.as_ref().is_none_or(|(best, _)| other.loss < best.loss) {
                 best = Some((other, others_chosen));

@@ -9,38 +9,37 @@ use bowden_model::law;
 
 use super::laws::{RIVALLING, are_of_one_sensor};
 use super::loudest::without_the_loudest;
-use super::{
-    Chosen, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, negligible, remove,
-};
+use super::{Chosen, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, remove};
 use crate::diagnose::candidates::Candidate;
 use crate::diagnose::law_candidates::law_candidates;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
 impl Search<'_> {
-    /// Compares the named effects with the laws of their component, and replaces those that a law predicts better than.
-    pub(super) fn compare_with_laws(
+    /// Compares the named effects with the laws of their component, replaces those that a law predicts better than, and returns whether there
+    /// were any.
+    pub(super) fn replace_by_laws(
         &self,
         present: &mut Fitted,
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
-    ) -> Result<(), Failure> {
+    ) -> Result<bool, Failure> {
         let mut replaced = false;
         for group in imitators(chosen) {
             if self.progress.interrupted() {
-                return Ok(());
+                return Ok(replaced);
             }
             let places: Vec<usize> =
                 (0..chosen.len()).filter(|place| group.contains(&chosen[*place].effect)).collect();
-            let fitted =
-                |place: &usize| &present.solution.model.effects[present.layout.first_found() + place];
-            let is_ordinary = |place: &usize| negligible(self.objective, self.believed, fitted(place));
-            // A law may have replaced one of them together with others. What an ordinary bench has is reported as neither.
-            if places.len() == group.len() && !places.iter().all(is_ordinary) {
+            // A law may have replaced one of them together with others.
+            if places.len() == group.len() {
                 replaced |= self.compare_one(&places, present, chosen, rounds)?;
             }
         }
-        if replaced { self.prune(present, chosen) } else { Ok(()) }
+        if replaced {
+            self.prune(present, chosen)?;
+        }
+        Ok(replaced)
     }
 
     /// Compares the effects at `places` with the best law in place of all of them, and returns whether the law replaces them.
@@ -73,17 +72,8 @@ impl Search<'_> {
             && self.is_no_parameter(&before, &law, law.newest_place())?
             && self.holds_across_recordings(present, &law, is_likelier)?
         {
-            let compared = [&before, &law].map(|fitted| fitted.solution.model.clone());
-            let stated = Chosen {
-                effect: law.newest(),
-                model: law.without_ordinary(),
-                loss_before: before.loss,
-                loss_after: law.loss,
-                compared,
-                others: Vec::new(),
-            };
             remove(chosen, places);
-            chosen.push(stated);
+            chosen.push(Chosen::newest_of(&law, &before, Vec::new()));
             *present = law;
             return Ok(true);
         }
@@ -164,13 +154,15 @@ mod tests {
         ActiveEffect { target: Target::One(Channel::F2), ..effect }
     }
 
-    fn chosen(effect: ActiveEffect, fitted: &Fitted, nothing: &Fitted) -> Chosen {
+    /// Of a bench, with the loss halved to 1.
+    fn chosen(effect: ActiveEffect, bench: &JointModel) -> Chosen {
+        let compared = [bench.clone(), bench.clone()];
         Chosen {
             effect,
-            model: fitted.without_ordinary(),
-            loss_before: nothing.loss,
-            loss_after: fitted.loss,
-            compared: [nothing, fitted].map(|fitted| fitted.solution.model.clone()),
+            model: bench.clone(),
+            loss_before: 2.0,
+            loss_after: 1.0,
+            compared,
             others: Vec::new(),
         }
     }
@@ -193,9 +185,9 @@ mod tests {
         let mut present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
         let mut found: Vec<Chosen> = present.solution.model.effects[present.layout.first_found()..]
             .iter()
-            .map(|effect| chosen(*effect, &present, &nothing))
+            .map(|effect| Chosen { effect: *effect, ..Chosen::newest_of(&present, &nothing, Vec::new()) })
             .collect();
-        search.compare_with_laws(&mut present, &mut found, &mut Vec::new()).unwrap();
+        search.replace_by_laws(&mut present, &mut found, &mut Vec::new()).unwrap();
         assert_eq!(found.len(), present.solution.model.effects.len() - present.layout.first_found());
         found
     }
@@ -225,15 +217,7 @@ mod tests {
     fn a_law_has_lower_prior_odds_than_a_name() {
         let recording = test_bench::swung(2);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let effect = named("joint_viscous_friction");
-        let chosen = Chosen {
-            effect,
-            model: model.clone(),
-            loss_before: 2.0,
-            loss_after: 1.0,
-            compared: [model.clone(), model.clone()],
-            others: Vec::new(),
-        };
+        let chosen = chosen(named("joint_viscous_friction"), &model);
         let rival = |effect, loss| Tried { effect, model: model.clone(), loss };
         let law = chosen.odds_of(&rival(stated("law_joint_friction_by_speed"), 1.0));
         assert!((law - 0.1477).abs() < 1e-3, "{law}");
@@ -247,22 +231,15 @@ mod tests {
     fn effects_of_one_sensor_and_of_one_part_are_compared_together_and_alone() {
         let recording = test_bench::swung(2);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let one = |effect| Chosen {
-            effect,
-            model: model.clone(),
-            loss_before: 2.0,
-            loss_after: 1.0,
-            compared: [model.clone(), model.clone()],
-            others: Vec::new(),
-        };
         let of_f4 = |effect| ActiveEffect { target: Target::One(Channel::F4), ..effect };
         let [gain, offset] = ["sensor_gain_error", "sensor_offset"].map(|id| of_f2(named(id)));
         let other = of_f4(named("sensor_offset"));
         let [dry, spring] = ["joint_coulomb_friction", "joint_spring"].map(named);
         let [cogging, harmonic] = [8.0, 16.0].map(|n| named("motor_cogging").with("cycles_per_turn", n));
         let law = stated("law_joint_friction_at_a_place");
-        let all: Vec<Chosen> =
-            [gain, dry, other, cogging, law, offset, harmonic, spring].map(one).into_iter().collect();
+        let all: Vec<Chosen> = [gain, dry, other, cogging, law, offset, harmonic, spring]
+            .map(|effect| chosen(effect, &model))
+            .to_vec();
         let expected = [
             vec![gain, offset],
             vec![dry, spring],
