@@ -248,3 +248,22 @@ fn waves(base: ActiveEffect, name: &str, rates: &[f64]) -> Vec<ActiveEffect> {
     let at = |rate: &f64| PHASES_RAD.map(|phase_rad| base.with(name, *rate).with("phase_rad", phase_rad));
     rates.iter().flat_map(at).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_of_an_angle_is_tried_below_and_above_a_straight_line_and_one_of_a_speed_once() {
+        let starts = |id: &str| -> Vec<ActiveEffect> {
+            let law = law::find(id).expect("a law of this name");
+            EXPONENTS.map(|exponent| ActiveEffect::with_defaults(law).with("exponent", exponent)).to_vec()
+        };
+        let apart = |id: &str, form| {
+            apart(form, starts(id))
+                .map(|starts| starts.iter().map(|start| start.parameters[1]).collect::<Vec<_>>())
+        };
+        assert_eq!(apart("law_joint_torque_by_angle", Form::Power), [vec![2.0, 3.0], vec![0.5]]);
+        assert_eq!(apart("law_joint_friction_by_speed", Form::EvenPower), [vec![0.5, 2.0, 3.0], vec![]]);
+    }
+}

@@ -89,6 +89,17 @@ fn instances_of_an_effect_stand_side_by_side() {
 }
 
 #[test]
+fn a_rival_is_shown_by_its_name_and_a_law_by_its_formula() {
+    let mut findings = example::findings(50);
+    let rival = &mut findings.diagnosis.effects[0].rivals[0];
+    let by_name = format!("<code>{}</code>", rival.id);
+    let by_formula = "<code>curvature * value^2</code>";
+    assert!(render(&findings).contains(&by_name) && !render(&findings).contains(by_formula));
+    findings.diagnosis.effects[0].rivals[0].formula = Some("curvature * value^2".into());
+    assert!(render(&findings).contains(by_formula) && !render(&findings).contains(&by_name));
+}
+
+#[test]
 fn text_from_files_is_escaped() {
     let hostile = "<script>alert(\"x\")</script>&'";
     let mut findings = example::findings(50);

@@ -136,6 +136,7 @@ mod tests {
     use super::*;
     use crate::diagnose::hypotheses::Asked;
     use crate::diagnose::layout::Layout;
+    use crate::diagnose::words;
     use crate::fit::objective::Objective;
     use crate::joint_model::JointModel;
     use crate::progress::Quiet;
@@ -225,6 +226,26 @@ mod tests {
         // 0.8 of the loss: 0.8^-10 = 9.3 times the odds.
         let better = chosen.odds_of(&rival(stated("law_joint_friction_by_speed"), 0.8));
         assert!((better / law - 9.313).abs() < 1e-2, "{better}");
+    }
+
+    /// Two rivals at the loss of the effect, of which the law has odds of 0.148: 1 / 2.148 of the probability are left for the effect.
+    #[test]
+    fn a_rival_that_is_a_law_is_listed_with_its_formula() {
+        let recording = test_bench::swung(2);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let mut chosen = chosen(named("joint_viscous_friction"), &model);
+        for effect in [stated("law_joint_friction_by_speed"), named("joint_coulomb_friction")] {
+            chosen.others.push(Tried { effect, model: model.clone(), loss: chosen.loss_after });
+        }
+        let (probability, rivals) = words::rivals(&chosen, 0.9, |_| None);
+        let listed: Vec<(&str, Option<&str>)> =
+            rivals.iter().map(|rival| (rival.id.as_str(), rival.formula.as_deref())).collect();
+        let formula = "amplitude_nm * abs(omega_out_rad_s)^exponent";
+        assert_eq!(
+            listed,
+            [("law_joint_friction_by_speed", Some(formula)), ("joint_coulomb_friction", None)]
+        );
+        assert!((probability - 1.0 / 2.148).abs() < 1e-3, "{probability}");
     }
 
     #[test]
