@@ -259,7 +259,7 @@ impl Case<'_> {
         }
         let [_, judging] = judge.split();
         let judging = (judging.recordings() > 0).then_some(&judging);
-        let mut unexplained = unexplained::unexplained(objective, judging, &selected.searched)?;
+        let mut unexplained = unexplained::unexplained(objective, judging, selected.searched())?;
         if unexplained.is_none() && selected.chosen.is_empty() {
             // The search may have explained what the rig that is written does not.
             unexplained = unexplained::far_off(objective, judging, &last.model)?;
@@ -525,7 +525,7 @@ impl Case<'_> {
             heldout_loss,
             training_loss,
             ordinary: selected
-                .ordinary
+                .ordinary()
                 .iter()
                 .map(|effect| OrdinaryEffect {
                     id: effect.descriptor().id.to_owned(),

@@ -143,12 +143,6 @@ impl Chosen {
 pub struct Selected {
     /// Model with recalibrated nominal parameters and no new effect.
     pub baseline: Solution,
-    /// The same with nuisance terms.
-    pub plain: JointModel,
-    /// Final model of the search: all selected effects and the nuisance terms.
-    pub searched: JointModel,
-    /// Nuisance terms from the last fit.
-    pub ordinary: Vec<ActiveEffect>,
     /// Model with all selected effects from the last fit, without nuisance terms.
     pub model: JointModel,
     /// Selected effects in the order of the model's new effects.
@@ -159,20 +153,29 @@ pub struct Selected {
     pub trials: Vec<Trial>,
     /// Whether the search was completed.
     pub complete: bool,
+    /// Fit without new effects, with nuisance terms.
+    nothing: Fitted,
+    /// Last fit of the search: all effects that it had selected then, and nuisance terms.
+    present: Fitted,
 }
 
 impl Selected {
+    /// Final model of the search: all selected effects and the nuisance terms.
+    #[must_use]
+    pub fn searched(&self) -> &JointModel {
+        &self.present.solution.model
+    }
+
+    /// Nuisance terms from the last fit.
+    #[must_use]
+    pub fn ordinary(&self) -> &[ActiveEffect] {
+        self.present.layout.ordinary(self.searched())
+    }
+
     /// The same search with all effects withdrawn.
     #[must_use]
     pub fn withdrawn(self) -> Self {
-        let ordinary = self.plain.effects[self.baseline.model.effects.len()..].to_vec();
-        Self {
-            searched: self.plain.clone(),
-            model: self.baseline.model.clone(),
-            ordinary,
-            chosen: Vec::new(),
-            ..self
-        }
+        Self { model: self.baseline.model.clone(), present: self.nothing.clone(), chosen: Vec::new(), ..self }
     }
 
     /// The same search without the effects that are negligible in `fitted`, the fit to `objective` at the rig's own resolution; `None` if
@@ -231,20 +234,8 @@ pub fn select(
     search.add_laws(&mut present, &mut chosen, &mut rounds)?;
     let trials = search.trials(&nothing)?;
     without_selected_rivals(&mut chosen);
-    let model = present.without_ordinary();
-    let searched = present.solution.model;
-    let ordinary = present.layout.ordinary(&searched).to_vec();
-    Ok(Selected {
-        baseline,
-        plain: nothing.solution.model,
-        searched,
-        ordinary,
-        model,
-        chosen,
-        rounds,
-        trials,
-        complete: !progress.interrupted(),
-    })
+    let (model, complete) = (present.without_ordinary(), !progress.interrupted());
+    Ok(Selected { baseline, model, chosen, rounds, trials, complete, nothing, present })
 }
 
 /// Compares the effects that `selected` names with the laws of their component. Only effects that have not faded at the rig's own resolution
@@ -264,14 +255,14 @@ pub fn compare_with_laws(
         return Ok(selected);
     }
     let search = Search { objective, believed: model, asked, progress };
-    let (layout, with) = Layout::of(model).with_ordinary(&selected.model);
-    let mut present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
-    let Selected { chosen, rounds, .. } = &mut selected;
-    if search.replace_by_laws(&mut present, chosen, rounds)? {
+    if selected.model != selected.present.without_ordinary() {
+        let (layout, with) = Layout::of(model).with_ordinary(&selected.model);
+        selected.present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
+    }
+    let Selected { chosen, rounds, nothing, present, .. } = &mut selected;
+    if search.replace_by_laws(nothing, present, chosen, rounds)? {
         without_selected_rivals(chosen);
         selected.model = present.without_ordinary();
-        selected.ordinary = present.layout.ordinary(&present.solution.model).to_vec();
-        selected.searched = present.solution.model;
     }
     selected.complete = !progress.interrupted();
     Ok(selected)
@@ -324,7 +315,7 @@ impl Losses {
 }
 
 /// A fitted model, the origin of each of its effects, and its losses.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 struct Fitted {
     layout: Layout,
     solution: Solution,

@@ -113,7 +113,8 @@ impl Search<'_> {
         predictions: &[Prediction],
         hypothesis: &'static Hypothesis,
     ) -> Result<Option<Fitted>, Failure> {
-        let (_, mut fits) = self.best_of(before, predictions, &[candidate(hypothesis)], f64::NEG_INFINITY)?;
+        let candidates = [candidate(hypothesis)];
+        let (_, mut fits) = self.best_of(before, predictions, &candidates, f64::NEG_INFINITY, None)?;
         Ok(if self.progress.interrupted() || fits.is_empty() { None } else { Some(fits.remove(0)) })
     }
 }

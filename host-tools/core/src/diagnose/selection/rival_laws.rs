@@ -17,9 +17,10 @@ use crate::outcome::Failure;
 
 impl Search<'_> {
     /// Compares the named effects with the laws of their component, replaces those that a law predicts better than, and returns whether there
-    /// were any.
+    /// were any. `nothing` is the fit without effects.
     pub(super) fn replace_by_laws(
         &self,
+        nothing: &Fitted,
         present: &mut Fitted,
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
@@ -33,7 +34,7 @@ impl Search<'_> {
                 (0..chosen.len()).filter(|place| group.contains(&chosen[*place].effect)).collect();
             // A law may have replaced one of them together with others.
             if places.len() == group.len() {
-                replaced |= self.compare_one(&places, present, chosen, rounds)?;
+                replaced |= self.compare_one(&places, nothing, present, chosen, rounds)?;
             }
         }
         if replaced {
@@ -46,19 +47,24 @@ impl Search<'_> {
     fn compare_one(
         &self,
         places: &[usize],
+        nothing: &Fitted,
         present: &mut Fitted,
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
-        let (layout, without) = present.without(places);
-        let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
+        let rest = if places.len() == chosen.len() {
+            nothing.clone()
+        } else {
+            let (layout, without) = present.without(places);
+            self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?
+        };
         let before = self.without_exhausted(&rest)?;
         let removed_share = 1.0 - present.loss / before.loss;
         let predictions = self.objective.predict(&before.solution.model)?;
         let mut all = law_candidates(&before.without_ordinary(), self.objective, &predictions);
         all.retain(|candidate| places.iter().all(|place| can_replace(candidate, &chosen[*place].effect)));
         let promising = (RIVALLING * removed_share).max(PROMISING);
-        let (record, fits) = self.best_of(&before, &predictions, &all, promising)?;
+        let (record, fits) = self.best_of(&before, &predictions, &all, promising, Some(present.loss))?;
         rounds.push(Round { loss_before: before.loss, candidates: record });
         let Some(best) = fits.into_iter().find(|fitted| fitted.finished) else { return Ok(false) };
         let law = self.with_ordinary(best)?;
@@ -188,7 +194,7 @@ mod tests {
             .iter()
             .map(|effect| Chosen { effect: *effect, ..Chosen::newest_of(&present, &nothing, Vec::new()) })
             .collect();
-        search.replace_by_laws(&mut present, &mut found, &mut Vec::new()).unwrap();
+        search.replace_by_laws(&nothing, &mut present, &mut found, &mut Vec::new()).unwrap();
         assert_eq!(found.len(), present.solution.model.effects.len() - present.layout.first_found());
         found
     }

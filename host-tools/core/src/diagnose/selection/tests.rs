@@ -12,24 +12,33 @@ use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
 use crate::test_bench;
 
+fn solution(model: JointModel) -> Solution {
+    Solution {
+        model,
+        values: Vec::new(),
+        stds: Vec::new(),
+        residuals: Residuals { values: Vec::new() },
+        spread: 1.0,
+        jacobian: DMatrix::zeros(0, 0),
+    }
+}
+
+fn fitted((layout, model): (Layout, JointModel)) -> Fitted {
+    let stretch_losses = [].into();
+    Fitted { layout, solution: solution(model), loss: 1.0, stretch_losses, finished: true, unseen: false }
+}
+
 fn nothing_found(bench: &JointModel) -> Selected {
+    let nothing = fitted((Layout::of(bench), bench.clone()));
     Selected {
-        baseline: Solution {
-            model: bench.clone(),
-            values: Vec::new(),
-            stds: Vec::new(),
-            residuals: Residuals { values: Vec::new() },
-            spread: 1.0,
-            jacobian: DMatrix::zeros(0, 0),
-        },
-        plain: bench.clone(),
-        searched: bench.clone(),
-        ordinary: Vec::new(),
+        baseline: solution(bench.clone()),
         model: bench.clone(),
         chosen: Vec::new(),
         rounds: Vec::new(),
         trials: Vec::new(),
         complete: true,
+        present: nothing.clone(),
+        nothing,
     }
 }
 
@@ -85,20 +94,24 @@ fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
 #[test]
 fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig() {
     let bench = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
-    let effect = |id| ActiveEffect::with_defaults(find(id).unwrap());
-    let with = |effects: &[ActiveEffect]| JointModel { effects: effects.to_vec(), ..bench.clone() };
-    let (before, after) = (effect("motor_coulomb_friction"), effect("presliding_compliance"));
-    let found = effect("joint_spring");
+    let recalibrated = Layout::of(&bench).with_ordinary(&bench);
+    let ordinary = recalibrated.0.ordinary(&recalibrated.1).to_vec();
+    assert!(!ordinary.is_empty());
+    let found = ActiveEffect::with_defaults(find("joint_spring").unwrap());
+    let (layout, mut searched) = recalibrated.0.with(&recalibrated.1, found);
+    for effect in &mut searched.effects {
+        effect.parameters[0] *= 2.0;
+    }
     let selected = Selected {
-        plain: with(&[before]),
-        searched: with(&[after, found]),
-        ordinary: vec![after],
-        model: with(&[found]),
+        model: layout.without_ordinary(&searched),
+        nothing: fitted(recalibrated.clone()),
+        present: fitted((layout, searched)),
         ..nothing_found(&bench)
     };
+    assert_ne!(selected.ordinary(), ordinary);
     let withdrawn = selected.withdrawn();
-    assert_eq!(withdrawn.ordinary, [before]);
-    assert_eq!((withdrawn.model, withdrawn.searched), (bench.clone(), with(&[before])));
+    assert_eq!(withdrawn.ordinary(), ordinary);
+    assert_eq!((&withdrawn.model, withdrawn.searched()), (&bench, &recalibrated.1));
 }
 
 /// The largest of the benches that hide nothing, the smallest of those whose sheaths stick; much friction that falls at

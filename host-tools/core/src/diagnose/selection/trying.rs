@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
 use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
-use crate::diagnose::onset::between_recordings;
+use crate::diagnose::onset::{between_recordings, moment_of};
 use crate::diagnose::screening::{Present, Screened, screen};
 use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
 use crate::outcome::Failure;
@@ -40,16 +40,18 @@ impl Search<'_> {
             }
             Kind::Law => law_candidates(&model, self.objective, &predictions),
         };
-        self.best_of(present, &predictions, &all, promising)
+        self.best_of(present, &predictions, &all, promising, None)
     }
 
-    /// The same for the given candidates; `predictions` are those of `present`.
+    /// The same for the given candidates; `predictions` are those of `present`. Candidates whose coarse fit is far behind `other_loss`, the
+    /// loss of what they would replace, are not among the fits.
     pub(super) fn best_of(
         &self,
         present: &Fitted,
         predictions: &[Prediction],
         all: &[Candidate],
         promising: f64,
+        other_loss: Option<f64>,
     ) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
         let Self { objective, progress, .. } = *self;
         let ranked = {
@@ -76,6 +78,9 @@ impl Search<'_> {
         for (place, fitted) in &fits {
             keep(*place, fitted);
         }
+        // Convergence shifts a moment far, and little else.
+        let is_behind = |fitted: &Fitted| other_loss.is_some_and(|other| fitted.loss > BEHIND * other);
+        fits.retain(|(_, fitted)| !is_behind(fitted) || moment_of(&fitted.newest()).is_some());
         best_first(&mut fits);
         let farthest = fits.first().map_or(0.0, |(_, best)| BEHIND * best.loss);
         let ahead = fits.iter().take(FINALISTS).take_while(|(_, fitted)| fitted.loss <= farthest).count();
