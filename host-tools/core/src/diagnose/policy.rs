@@ -21,6 +21,8 @@ pub struct Policy {
     /// Loss above which the residual is far beyond noise and bench tolerances: every residual is beyond the three noise scales at which the
     /// loss function changes from quadratic to linear.
     pub much_left: f64,
+    /// Loss that sensor noise and the tolerances of an ordinary bench leave: residuals of one noise scale.
+    pub noise_loss: f64,
     /// Relative reduction of the loss that each further parameter of a candidate must achieve in a comparison.
     pub share_per_parameter: f64,
     /// Minimum relative reduction of the loss for a law to be stated. A law is selected from many forms with up to three coefficients, so
@@ -49,6 +51,7 @@ pub const POLICY: Policy = Policy {
     name_loss: 0.1,
     elsewhere_loss: 0.05,
     much_left: 10.0,
+    noise_loss: 1.0,
     share_per_parameter: 0.03,
     law_share: 0.3,
     law_loss: 0.4,

@@ -15,19 +15,18 @@ const RIVALS: usize = 4;
 const BEGINNINGS: usize = 3;
 
 impl Search<'_> {
-    /// Restarts the search from each of the best rivals of the first effect if the remaining loss is above
-    /// [`Policy::much_left`](crate::diagnose::policy::Policy::much_left), and keeps the best result that is better by at least what a name
-    /// must achieve. If no effect was found, it restarts from the best candidates of the first round. `nothing` is the fit without effects.
+    /// Restarts the search from each of the best rivals of the first effect, keeps the best result that is better by at least what a name
+    /// must achieve, and returns whether there was one. If no effect was found, it restarts from the best candidates of the first round.
+    /// `nothing` is the fit without effects.
+    ///
+    /// It is for a remaining loss above [`Policy::much_left`] that no law reduces to [`Policy::noise_loss`].
     pub(super) fn begin_again(
         &self,
         nothing: &Fitted,
         present: &mut Fitted,
         chosen: &mut Vec<Chosen>,
         rounds: &mut Vec<Round>,
-    ) -> Result<(), Failure> {
-        if present.loss <= POLICY.much_left {
-            return Ok(());
-        }
+    ) -> Result<bool, Failure> {
         let (rivals, most, own) = match chosen.first() {
             Some(first) => {
                 let own = Tried { effect: first.effect, model: first.model.clone(), loss: first.loss_after };
@@ -38,7 +37,7 @@ impl Search<'_> {
         let mut best: Option<(Fitted, Vec<Chosen>)> = None;
         for (place, rival) in rivals.iter().take(most).enumerate() {
             if self.progress.interrupted() {
-                return Ok(());
+                return Ok(false);
             }
             let (layout, with) = nothing.layout.with(&nothing.solution.model, rival.effect);
             let mut other = self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
@@ -59,8 +58,9 @@ impl Search<'_> {
             && self.is_better((present, chosen), (&other, &others_chosen))?
         {
             (*present, *chosen) = (other, others_chosen);
+            return Ok(true);
         }
-        Ok(())
+        Ok(false)
     }
 
     /// Whether the effects of a restart replace the present ones. Each effect of either set is necessary within its set. With enough

@@ -16,10 +16,24 @@ const MOST_LAWS: usize = 2;
 pub(super) const RIVALLING: f64 = 0.5;
 
 impl Search<'_> {
+    /// Searches laws, in place of the named effects and then in addition to them. `nothing` is the fit without effects.
+    pub(super) fn with_laws(
+        &self,
+        nothing: &Fitted,
+        present: &mut Fitted,
+        chosen: &mut Vec<Chosen>,
+        rounds: &mut Vec<Round>,
+    ) -> Result<(), Failure> {
+        if self.law_in_place_of_names(nothing, present, chosen, rounds)? {
+            self.add_names(present, chosen, rounds, Policy::worth_naming)?;
+        }
+        self.add_laws(present, chosen, rounds)
+    }
+
     /// Replaces all named effects, or all but the first, by one law that predicts clearly better, and returns whether it did. Against one
     /// effect the law must reach [`Policy::worth_stating`]; against several, or one of the same sensor, what a name must achieve.
     /// `nothing` is the fit without effects.
-    pub(super) fn law_in_place_of_names(
+    fn law_in_place_of_names(
         &self,
         nothing: &Fitted,
         present: &mut Fitted,
@@ -65,7 +79,7 @@ impl Search<'_> {
 
     /// Adds laws that reach their threshold, and removes effects that a law makes superfluous: such an effect was only the nearest
     /// entry of the catalogue.
-    pub(super) fn add_laws(
+    fn add_laws(
         &self,
         present: &mut Fitted,
         chosen: &mut Vec<Chosen>,
