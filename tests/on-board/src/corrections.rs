@@ -128,16 +128,12 @@ impl Case {
         Ok(error_of(&self.trial.natively()?, self.error).rms)
     }
 
-    /// Error of the joint with its effect and these parameters, with the control code alone.
-    pub fn natively(&self, stored: &Stored) -> Outcome<f64> {
-        let course = self.concealing(stored).natively().map_err(|failure| self.named(failure))?;
-        Ok(error_of(&course, self.error).rms)
-    }
-
     /// Errors of the joint with its effect and these parameters.
     pub fn errors(&self, elf: &[u8], stored: &Stored) -> Outcome<Errors> {
-        let trial = self.concealing(stored);
-        let named = |failure| self.named(failure);
+        let effects = vec![self.effect.clone()];
+        let trial = Trial { effects, parameters: stored.parameters.clone(), ..self.trial.clone() };
+        let named = |Failure(text)| Failure(format!("{}: {text}", self.name));
+        let natively = error_of(&trial.natively().map_err(named)?, self.error).rms;
         let board = Board::builder(elf)
             .bench(&trial.bench, &trial.effects)
             .seed(trial.seed)
@@ -148,16 +144,7 @@ impl Case {
             host.home().map_err(named)?;
         }
         let on_image = error_of(&trial.follow(&mut host).map_err(named)?, self.error).rms;
-        Ok(Errors { on_image, natively: self.natively(stored)? })
-    }
-
-    fn concealing(&self, stored: &Stored) -> Trial {
-        let effects = vec![self.effect.clone()];
-        Trial { effects, parameters: stored.parameters.clone(), ..self.trial.clone() }
-    }
-
-    fn named(&self, Failure(text): Failure) -> Failure {
-        Failure(format!("{}: {text}", self.name))
+        Ok(Errors { on_image, natively })
     }
 }
 
