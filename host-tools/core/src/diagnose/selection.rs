@@ -227,17 +227,14 @@ pub fn select(
     let mut chosen: Vec<Chosen> = Vec::new();
     let mut rounds = Vec::new();
     search.add_names(&mut present, &mut chosen, &mut rounds, Policy::worth_naming)?;
-    if present.loss > POLICY.much_left {
-        let (mut explained, mut by_laws) = (present.clone(), chosen.clone());
-        search.with_laws(&nothing, &mut explained, &mut by_laws, &mut rounds)?;
-        let is_done = explained.loss <= POLICY.noise_loss;
-        if is_done || !search.begin_again(&nothing, &mut present, &mut chosen, &mut rounds)? {
-            (present, chosen) = (explained, by_laws);
-        } else {
-            search.with_laws(&nothing, &mut present, &mut chosen, &mut rounds)?;
-        }
-    } else {
-        search.with_laws(&nothing, &mut present, &mut chosen, &mut rounds)?;
+    let (mut again, mut chosen_again) = (present.clone(), chosen.clone());
+    search.with_laws(&nothing, &mut present, &mut chosen, &mut rounds)?;
+    if again.loss > POLICY.much_left
+        && present.loss > POLICY.noise_loss
+        && search.begin_again(&nothing, &mut again, &mut chosen_again, &mut rounds)?
+    {
+        search.with_laws(&nothing, &mut again, &mut chosen_again, &mut rounds)?;
+        (present, chosen) = (again, chosen_again);
     }
     let trials = search.trials(&nothing)?;
     without_selected_rivals(&mut chosen);

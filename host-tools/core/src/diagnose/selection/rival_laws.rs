@@ -7,7 +7,7 @@
 use bowden_model::effect::{ActiveEffect, Component};
 use bowden_model::law;
 
-use super::laws::{RIVALLING, are_of_one_sensor};
+use super::laws::RIVALLING;
 use super::loudest::without_the_loudest;
 use super::{Chosen, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, remove};
 use crate::diagnose::candidates::Candidate;
@@ -128,6 +128,12 @@ fn can_replace(candidate: &Candidate, named: &ActiveEffect) -> bool {
     })
 }
 
+/// Whether both change the reading of the same sensor, so that their losses differ in its channel alone.
+fn are_of_one_sensor(one: &ActiveEffect, other: &ActiveEffect) -> bool {
+    let of_sensor = |effect: &ActiveEffect| effect.descriptor().component == Component::Sensors;
+    of_sensor(one) && of_sensor(other) && one.target.overlaps(other.target)
+}
+
 /// The effects at `places`, without further instances.
 fn names_at<'c>(places: &'c [usize], chosen: &'c [Chosen]) -> impl Iterator<Item = &'c Chosen> {
     places.iter().filter(|place| !is_further(chosen, **place)).map(|place| &chosen[*place])
@@ -157,8 +163,12 @@ mod tests {
         ActiveEffect::with_defaults(law::find(id).expect("a law of this name"))
     }
 
+    fn at(effect: ActiveEffect, target: Target) -> ActiveEffect {
+        ActiveEffect { target, ..effect }
+    }
+
     fn of_f2(effect: ActiveEffect) -> ActiveEffect {
-        ActiveEffect { target: Target::One(Channel::F2), ..effect }
+        at(effect, Target::One(Channel::F2))
     }
 
     /// Of a bench, with the loss halved to 1.
@@ -175,10 +185,10 @@ mod tests {
     }
 
     /// What is left of these named effects on a bench whose physics is `real`.
-    fn compared(real: ActiveEffect, names: &[ActiveEffect]) -> Vec<Chosen> {
+    fn compared(real: &[ActiveEffect], names: &[ActiveEffect]) -> Vec<Chosen> {
         let mut recording = test_bench::swung(6000);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let with_real = JointModel { effects: vec![real], ..model.clone() };
+        let with_real = JointModel { effects: real.to_vec(), ..model.clone() };
         let measured = replay(&with_real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
         for (channel, values) in measured.channels() {
             recording.set(channel, values.to_vec());
@@ -203,17 +213,32 @@ mod tests {
     #[test]
     fn a_gain_and_an_offset_that_imitate_a_curved_sensor_give_way_to_it() {
         let curved = of_f2(stated("law_reading_is_curved").with("curvature", 0.01));
-        let left = compared(curved, &[of_f2(named("sensor_gain_error")), of_f2(named("sensor_offset"))]);
+        let left = compared(&[curved], &[of_f2(named("sensor_gain_error")), of_f2(named("sensor_offset"))]);
         let [law] = &left[..] else { panic!("{:?}", left.iter().map(|one| one.effect).collect::<Vec<_>>()) };
         assert_eq!(law.effect.descriptor().id, "law_reading_is_curved");
         let curvature = law.effect.parameters[0];
         assert!((curvature / 0.01 - 1.0).abs() < 0.05, "{curvature}");
     }
 
+    /// A fit without any effect, in place of one without the replaced effects, would leave the spring to the law.
+    #[test]
+    fn a_spring_beside_a_curved_sensor_stays() {
+        let curved = of_f2(stated("law_reading_is_curved").with("curvature", 0.01));
+        let spring = named("joint_spring").with("stiffness_nm_per_rad", 0.5);
+        let names = [of_f2(named("sensor_gain_error")), of_f2(named("sensor_offset")), spring];
+        let left = compared(&[curved, spring], &names);
+        let [spring, law] = &left[..] else {
+            panic!("{:?}", left.iter().map(|one| one.effect).collect::<Vec<_>>())
+        };
+        assert_eq!(law.effect.descriptor().id, "law_reading_is_curved");
+        assert_eq!(spring.effect.descriptor().id, "joint_spring");
+        assert!(law.loss_before > law.loss_after);
+    }
+
     #[test]
     fn an_offset_stays_one() {
         let offset = of_f2(named("sensor_offset").with("offset", 2.0));
-        let left = compared(offset, &[of_f2(named("sensor_offset"))]);
+        let left = compared(&[offset], &[of_f2(named("sensor_offset"))]);
         let [name] = &left[..] else { panic!("{:?}", left.iter().map(|one| one.effect).collect::<Vec<_>>()) };
         assert_eq!(name.effect.descriptor().id, "sensor_offset");
         assert!((name.effect.parameters[0] - 2.0).abs() < 0.02, "{:?}", name.effect);
@@ -258,7 +283,7 @@ mod tests {
     fn effects_of_one_sensor_and_of_one_part_are_compared_together_and_alone() {
         let recording = test_bench::swung(2);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let of_f4 = |effect| ActiveEffect { target: Target::One(Channel::F4), ..effect };
+        let of_f4 = |effect| at(effect, Target::One(Channel::F4));
         let [gain, offset] = ["sensor_gain_error", "sensor_offset"].map(|id| of_f2(named(id)));
         let other = of_f4(named("sensor_offset"));
         let [dry, spring] = ["joint_coulomb_friction", "joint_spring"].map(named);
@@ -278,5 +303,20 @@ mod tests {
             vec![spring],
         ];
         assert_eq!(imitators(&all), expected);
+    }
+
+    #[test]
+    fn a_zero_is_compared_with_a_law_of_its_own_sensor_and_with_no_other() {
+        let of_f3 = at(named("sensor_offset"), Target::One(Channel::F3));
+        for (id, target, compared) in [
+            ("law_reading_sets_in", Target::One(Channel::F3), true),
+            ("law_reading_sets_in", Target::Tensions, true),
+            ("law_reading_sets_in", Target::One(Channel::F4), false),
+            ("law_joint_torque_by_angle", Target::None, false),
+        ] {
+            assert_eq!(are_of_one_sensor(&of_f3, &at(stated(id), target)), compared, "{id} of {target:?}");
+        }
+        // Two without a channel are of one target, and of no sensor.
+        assert!(!are_of_one_sensor(&named("joint_spring"), &stated("law_joint_torque_by_angle")));
     }
 }

@@ -4,12 +4,17 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 use nalgebra::DMatrix;
 
-use super::{Chosen, Fitted, Losses, POLICY, Selected, Tried, handicap, largest_ordinary, negligible};
+use super::{
+    Asked, Chosen, Fitted, Losses, POLICY, Selected, Tried, handicap, largest_ordinary, law, negligible,
+    select,
+};
 use crate::diagnose::layout::Layout;
 use crate::diagnose::policy::Policy;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
+use crate::progress::Quiet;
+use crate::simulation::{ReplayInput, replay};
 use crate::test_bench;
 
 fn solution(model: JointModel) -> Solution {
@@ -112,6 +117,27 @@ fn where_nothing_is_found_after_all_the_ordinary_is_that_of_the_recalibrated_rig
     let withdrawn = selected.withdrawn();
     assert_eq!(withdrawn.ordinary(), ordinary);
     assert_eq!((&withdrawn.model, withdrawn.searched()), (&bench, &recalibrated.1));
+}
+
+/// Without the law, the first effects leave more than ten times the noise.
+#[test]
+fn a_law_that_leaves_no_more_than_noise_ends_the_search() {
+    let mut recording = test_bench::swung(6000);
+    let bench = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let uneven = ActiveEffect::with_defaults(law::find("law_output_radius_along_the_angle").unwrap())
+        .with("amplitude", 0.3)
+        .with("cycles_per_turn", 8.0);
+    let real = JointModel { effects: vec![uneven], ..bench.clone() };
+    let measured = replay(&real, &ReplayInput::new(&bench, &recording).unwrap()).unwrap();
+    for (channel, values) in measured.channels() {
+        recording.set(channel, values.to_vec());
+    }
+    let objective = Objective::new(&bench, &[recording], &[], true).unwrap();
+    let selected = select(&objective, &bench, &Asked::default(), &Quiet).unwrap();
+    let losses: Vec<f64> = selected.rounds.iter().map(|round| round.loss_before).collect();
+    let explained = losses.iter().position(|loss| *loss <= POLICY.noise_loss).unwrap();
+    assert!(losses[explained - 1] > POLICY.much_left, "{losses:?}");
+    assert!(losses[explained..].iter().all(|loss| *loss <= POLICY.much_left), "{losses:?}");
 }
 
 /// The largest of the benches that hide nothing, the smallest of those whose sheaths stick; much friction that falls at
