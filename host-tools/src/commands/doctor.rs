@@ -188,7 +188,9 @@ fn board(port: &str, timeout: Duration) -> Vec<Check> {
 fn state(client: &mut Client) -> Check {
     let status = client.status();
     let greeting = client.greeting();
-    let found = format!("{}, firmware {} {}", greeting.board, greeting.firmware, greeting.revision);
+    // An image that was built outside a repository names no revision.
+    let image = format!("{} {}", greeting.firmware, greeting.revision);
+    let found = format!("{}, firmware {}", greeting.board, image.trim_end());
     match status {
         Err(error) => Check::new("board", Grade::Wrong, format!("{found}: {error}"), ""),
         Ok(status) => match status.fault {

@@ -48,7 +48,7 @@ enum Action {
     /// Set parameters
     Set {
         /// Name, as in the list, and new value
-        #[arg(required = true, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+        #[arg(required = true, value_name = "NAME=VALUE")]
         assignments: Vec<String>,
     },
     /// Set the parameters that a file names

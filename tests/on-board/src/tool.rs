@@ -38,6 +38,13 @@ pub struct Ran {
     pub errors: String,
 }
 
+impl Ran {
+    fn of(output: &Output) -> Self {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        Self { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) }
+    }
+}
+
 /// The tool: the file that `BOWDEN_BIN` names, or the newest build.
 pub fn tool() -> Outcome<PathBuf> {
     if let Some(path) = env::var_os("BOWDEN_BIN") {
@@ -51,6 +58,13 @@ pub fn tool() -> Outcome<PathBuf> {
         .max()
         .map(|(_, path)| path);
     newest.ok_or_else(|| Failure(format!("{}: no tool; build it: cargo build -p bowden", folder.display())))
+}
+
+/// Runs `bowden <line>`, which needs no board, in `folder`.
+pub fn run_alone(folder: &Path, line: &[&str]) -> Outcome<Ran> {
+    let path = tool()?;
+    let output = Command::new(&path).args(line).current_dir(folder).stdin(Stdio::null()).output();
+    Ok(Ran::of(&output.map_err(|error| Failure(format!("{} {}: {error}", path.display(), line.join(" "))))?))
 }
 
 /// A board whose port is a pseudo terminal.
@@ -79,10 +93,19 @@ impl Running {
 
     /// Ctrl-C.
     pub fn interrupt(&self) -> Outcome {
+        self.signal("-INT")
+    }
+
+    /// Ends it with nothing of it running any more.
+    pub fn kill(&self) -> Outcome {
+        self.signal("-KILL")
+    }
+
+    fn signal(&self, signal: &str) -> Outcome {
         let process = self.process.to_string();
-        match Command::new("kill").args(["-INT", &process]).status() {
+        match Command::new("kill").args([signal, &process]).status() {
             Ok(status) if status.success() => Ok(()),
-            other => fail(format!("kill -INT {process}: {other:?}")),
+            other => fail(format!("kill {signal} {process}: {other:?}")),
         }
     }
 }
@@ -210,8 +233,7 @@ impl Plugged {
         let output =
             running.waiting.join().map_err(|_| Failure(format!("{what}: the waiting thread failed")))?;
         let output = output.map_err(|error| Failure(format!("{what}: {error}")))?;
-        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        Ok(Ran { status: output.status.code(), output: text(&output.stdout), errors: text(&output.stderr) })
+        Ok(Ran::of(&output))
     }
 
     /// Runs `bowden <command> --port <terminal> --timeout 600 <arguments>` and answers its questions: `answer` gets each question, and the

@@ -1,21 +1,19 @@
 //! The log of the release image, read by `bowden log` and made a recording by `bowden import`.
 
 use std::path::Path;
-use std::process::Command;
 
 use bowden_link::ToBoard;
 use bowden_link::message::Provocation;
 use bowden_on_board_tests::host::Host;
-use bowden_on_board_tests::tool::tool;
+use bowden_on_board_tests::tool::{Ran, run_alone};
 use bowden_on_board_tests::{Outcome, image};
 
 use crate::stop::moving;
 
 /// Runs the tool in `folder`.
 fn bowden(folder: &Path, arguments: &[&str]) -> Outcome<(Option<i32>, String, String)> {
-    let output = Command::new(tool()?).args(arguments).current_dir(folder).output().expect("the tool starts");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    Ok((output.status.code(), text(&output.stdout), text(&output.stderr)))
+    let Ran { status, output, errors } = run_alone(folder, arguments)?;
+    Ok((status, output, errors))
 }
 
 /// Board time between two looks of a probe that looks at every moment: two cycles of the core before its clock is set.

@@ -2,18 +2,15 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
 
 use bowden_board::{Board, EncoderAt, Injection, Rail, TensionAt};
-use bowden_on_board_tests::tool::{Plugged, tool};
+use bowden_on_board_tests::tool::{Plugged, Ran, run_alone};
 use bowden_on_board_tests::{Outcome, image};
 
 /// Runs `bowden replay-control` in `folder`.
 fn replay(folder: &Path, recording: &str) -> Outcome<(Option<i32>, String, String)> {
-    let arguments = ["replay-control", recording];
-    let output = Command::new(tool()?).args(arguments).current_dir(folder).output().expect("the tool starts");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    Ok((output.status.code(), text(&output.stdout), text(&output.stderr)))
+    let Ran { status, output, errors } = run_alone(folder, &["replay-control", recording])?;
+    Ok((status, output, errors))
 }
 
 /// Every tick from off over self test, homing and run to off, in two modes; then a changed recording.

@@ -7,6 +7,7 @@ use bowden_core::recording::{ReadOptions, Recording};
 use bowden_on_board_tests::tool::Plugged;
 use bowden_on_board_tests::{Outcome, image};
 use serde_json::Value;
+use virtual_bench::nominal_rig_toml;
 
 const PLAN: &str = r#"schema = "bowden-plan/1"
 name = "weekly"
@@ -94,6 +95,46 @@ fn a_plan_is_carried_out_on_the_board_once() -> Outcome {
     );
     for (step, file) in steps[2..].iter().zip(&files) {
         assert!(fs::read(place.join(format!("out/{step}.mcap"))).expect("a file") == *file, "{step}");
+    }
+    Ok(())
+}
+
+#[test]
+fn an_excitation_for_the_rig_is_carried_out_on_the_board() -> Outcome {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let plan = "schema = \"bowden-plan/1\"\n[limits]\nangle_rad = 0.3\n[[step]]\nkind = \"home\"\n";
+    // The shortest: three motions of two seconds.
+    let excite = "[[step]]\nkind = \"excite\"\nrig = \"rig.toml\"\nseconds = 6.0\n";
+    fs::write(place.join("plan.toml"), [plan, excite].concat()).expect("a file");
+    fs::write(place.join("rig.toml"), nominal_rig_toml("bench")).expect("a file");
+    let mut board = Plugged::new(Board::builder(&image::firmware()?).build()?)?;
+    let port = board.port();
+    let line = ["run", "--quiet", "plan.toml", "--out", "out", "--port", &port, "--timeout", "600", "--json"];
+    let listed = board.run_in(place, &[&line[..], &["--dry-run"]].concat())?;
+    assert_eq!((listed.status, listed.errors.as_str()), (Some(0), ""));
+    let mut largest = 0.0_f64;
+    let ran = board.run_in_beside(place, &line, |board| {
+        largest = largest.max(board.bench().theta_out_rad().abs());
+    })?;
+    assert_eq!((ran.status, ran.errors.as_str()), (Some(0), ""), "{}", ran.output);
+    assert_eq!(board.board.pwm().duty, None, "off at the end");
+    // The joint has moved, and stayed where the plan allows it to be, by the bench's own angle.
+    assert!((0.15..0.33).contains(&largest), "{largest} rad");
+
+    let [listed, ran] =
+        [listed.output, ran.output].map(|text| serde_json::from_str::<Value>(&text).expect("JSON"));
+    let names = |told: &Value| -> Vec<String> {
+        let steps = told["steps"].as_array().expect("steps");
+        steps.iter().map(|step| step["name"].as_str().expect("a name").to_owned()).collect()
+    };
+    assert_eq!((names(&listed), names(&ran).len()), (names(&ran), 4), "{ran}");
+    for step in ran["steps"].as_array().expect("steps").iter().skip(1) {
+        let file = step["file"].as_str().expect("a file");
+        assert!(file.contains("-excite-") && step["loss"].is_null(), "{step}");
+        let recording =
+            Recording::load(&place.join("out").join(file), &ReadOptions::default()).expect("a recording");
+        assert_eq!((step["rows"].as_u64(), recording.len()), (Some(20_000), 20_000), "{step}");
     }
     Ok(())
 }
