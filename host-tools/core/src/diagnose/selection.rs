@@ -13,6 +13,7 @@ mod exchange;
 mod hypotheses;
 mod laws;
 mod loudest;
+mod names;
 mod own_channel;
 mod repeating;
 mod rival_laws;
@@ -23,7 +24,6 @@ use std::cmp::Ordering;
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
 use bowden_model::effects::find;
 use bowden_model::law;
-use rayon::prelude::*;
 
 use super::hypotheses::Asked;
 use super::layout::{Layout, largest_ordinary};
@@ -44,9 +44,6 @@ const FINALISTS: usize = 3;
 
 /// Minimum estimated relative reduction of the loss for a candidate to be fitted.
 const PROMISING: f64 = 0.08;
-
-/// Maximum number of named effects.
-const MOST_EFFECTS: usize = 6;
 
 /// Optimiser evaluations per parameter and round.
 const PATIENCE: usize = 5;
@@ -222,21 +219,21 @@ pub fn select(
     progress: &dyn Progress,
 ) -> Result<Selected, Failure> {
     let search = Search { objective, believed: model, asked, progress };
-    let (baseline, mut present) = search.baseline()?;
-    let nothing = present.clone();
-    let mut chosen: Vec<Chosen> = Vec::new();
+    let (baseline, nothing) = search.baseline()?;
+    let mut now = Explanation { fit: nothing.clone(), chosen: Vec::new() };
     let mut rounds = Vec::new();
-    search.add_names(&mut present, &mut chosen, &mut rounds, Policy::worth_naming)?;
-    let (mut again, mut chosen_again) = (present.clone(), chosen.clone());
-    search.with_laws(&nothing, &mut present, &mut chosen, &mut rounds)?;
-    if again.loss > POLICY.much_left
-        && present.loss > POLICY.noise_loss
-        && search.begin_again(&nothing, &mut again, &mut chosen_again, &mut rounds)?
+    search.add_names(&mut now, &mut rounds, Policy::worth_naming)?;
+    let mut again = now.clone();
+    search.with_laws(&nothing, &mut now, &mut rounds)?;
+    if again.fit.loss > POLICY.much_left
+        && now.fit.loss > POLICY.noise_loss
+        && search.begin_again(&nothing, &mut again, &mut rounds)?
     {
-        search.with_laws(&nothing, &mut again, &mut chosen_again, &mut rounds)?;
-        (present, chosen) = (again, chosen_again);
+        search.with_laws(&nothing, &mut again, &mut rounds)?;
+        now = again;
     }
     let trials = search.trials(&nothing)?;
+    let Explanation { fit: present, mut chosen } = now;
     without_selected_rivals(&mut chosen);
     let (model, complete) = (present.without_ordinary(), !progress.interrupted());
     Ok(Selected { baseline, model, chosen, rounds, trials, complete, nothing, present })
@@ -263,13 +260,14 @@ pub fn compare_with_laws(
         let (layout, with) = Layout::of(model).with_ordinary(&selected.model);
         selected.present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
     }
-    let Selected { chosen, rounds, nothing, present, .. } = &mut selected;
-    if search.replace_by_laws(nothing, present, chosen, rounds)? {
-        without_selected_rivals(chosen);
-        selected.model = present.without_ordinary();
+    let Selected { chosen, present, nothing, mut rounds, mut model, .. } = selected;
+    let mut now = Explanation { fit: present, chosen };
+    if search.replace_by_laws(&nothing, &mut now, &mut rounds)? {
+        without_selected_rivals(&mut now.chosen);
+        model = now.fit.without_ordinary();
     }
-    selected.complete = !progress.interrupted();
-    Ok(selected)
+    let (Explanation { fit: present, chosen }, complete) = (now, !progress.interrupted());
+    Ok(Selected { chosen, present, nothing, rounds, model, complete, ..selected })
 }
 
 /// Removes rivals that were selected as well.
@@ -278,19 +276,6 @@ fn without_selected_rivals(chosen: &mut [Chosen]) {
     for one in chosen {
         one.others.retain(|tried| !found.iter().any(|found| found.is_beside(&tried.effect)));
     }
-}
-
-/// Losses of a round in which a nuisance term at its upper bound was left out.
-#[derive(Clone, Copy)]
-struct Losses {
-    /// Without the nuisance term, before the round.
-    before: f64,
-    /// Without the nuisance term, with the candidate.
-    with: f64,
-    /// With the nuisance term, before the round.
-    ordinary: f64,
-    /// With the nuisance term and the candidate.
-    with_both: f64,
 }
 
 /// Threshold: whether a reduction of the loss from one value to another is sufficient.
@@ -303,19 +288,6 @@ enum Kind {
     Name,
     /// Closed forms at the ports of the joint.
     Law,
-}
-
-impl Losses {
-    /// Whether the candidate is selected: it reaches the threshold, and either fits better than the nuisance term or reaches the threshold
-    /// in addition to it.
-    fn found(self, worth: Worth) -> bool {
-        worth(&POLICY, self.before, self.with)
-            && (self.replaces_ordinary() || worth(&POLICY, self.ordinary, self.with_both))
-    }
-
-    fn replaces_ordinary(self) -> bool {
-        self.with < self.ordinary
-    }
 }
 
 /// A fitted model, the origin of each of its effects, and its losses.
@@ -384,6 +356,22 @@ impl Fitted {
     }
 }
 
+/// Effects that explain the recordings together, as far as the search has come.
+#[derive(Clone)]
+struct Explanation {
+    /// Fit of all of them, with nuisance terms.
+    fit: Fitted,
+    /// The effects, in the order in which the model of the fit has them.
+    chosen: Vec<Chosen>,
+}
+
+impl Explanation {
+    /// Number of named effects; instances of one effect on one component count once.
+    fn names(&self) -> usize {
+        (0..self.chosen.len()).filter(|index| !is_further(&self.chosen, *index)).count()
+    }
+}
+
 /// Inputs that all steps of a search share.
 struct Search<'a> {
     objective: &'a Objective,
@@ -403,29 +391,6 @@ impl Search<'_> {
         Ok((baseline, self.with_ordinary(plain)?))
     }
 
-    /// Adds effects one by one while one reaches the threshold `worth`, and removes those that later ones make superfluous.
-    fn add_names(
-        &self,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
-        rounds: &mut Vec<Round>,
-        worth: Worth,
-    ) -> Result<(), Failure> {
-        while names(chosen) < MOST_EFFECTS && !self.progress.interrupted() {
-            let before = self.without_exhausted(present)?;
-            let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
-            rounds.push(Round { loss_before: before.loss, candidates: record });
-            let Some((found, with)) = self.found(&before, present, fits, worth)? else {
-                break;
-            };
-            chosen.push(found);
-            *present = with;
-            self.add_instances(present, chosen)?;
-        }
-        self.exchange(present, chosen)?;
-        if self.progress.interrupted() { Ok(()) } else { self.prune(present, chosen) }
-    }
-
     /// `present`, refitted without the nuisance terms that are at their upper bound.
     fn without_exhausted(&self, present: &Fitted) -> Result<Fitted, Failure> {
         match present.layout.without_exhausted(self.believed, &present.solution.model) {
@@ -443,111 +408,6 @@ impl Search<'_> {
         self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])
     }
 
-    /// The best of `fits`, sorted best first and relative to `before`, if it is selected, and its fit with nuisance terms.
-    ///
-    /// A nuisance term at its upper bound was left out of the round. It may stand for part of the missing physics, so that the best candidate
-    /// without it need not be the best with it: all finalists are refitted with it.
-    fn found(
-        &self,
-        before: &Fitted,
-        present: &Fitted,
-        mut fits: Vec<Fitted>,
-        worth: Worth,
-    ) -> Result<Option<(Chosen, Fitted)>, Failure> {
-        for _ in 0..FINALISTS {
-            let Some((chosen, with, without)) = self.best_showing(before, present, &mut fits, worth)? else {
-                return Ok(None);
-            };
-            if self.is_no_parameter(without, &with, with.newest_place())?
-                && self.holds_across_recordings(without, &with, |a, b| worth(&POLICY, a, b))?
-            {
-                return Ok(Some((chosen, with)));
-            }
-        }
-        Ok(None)
-    }
-
-    /// The same without cross-validation; removes the candidate from `fits`, and returns the fit that it is compared with.
-    fn best_showing<'f>(
-        &self,
-        before: &'f Fitted,
-        present: &'f Fitted,
-        fits: &mut Vec<Fitted>,
-        worth: Worth,
-    ) -> Result<Option<(Chosen, Fitted, &'f Fitted)>, Failure> {
-        // Candidates that all data support rank before those that a single stretch supports.
-        let worth_it = |without, with| worth(&POLICY, without, with);
-        let shows = |fitted: &Fitted| fitted.shows(before, &fitted.newest(), worth_it);
-        fits.sort_by_key(|fitted| !shows(fitted));
-        let showing = fits.iter().take_while(|fitted| shows(fitted)).count();
-        let finalists = if before.layout == present.layout { 1 } else { FINALISTS };
-        let finalists = &fits[..finalists.min(showing)];
-        let mut beside: Vec<Fitted> = finalists
-            .par_iter()
-            .map(|fitted| self.with_ordinary(fitted.clone()))
-            .collect::<Result<_, Failure>>()?;
-        let first = beside.iter().enumerate().min_by(|(_, a), (_, b)| a.best_first(b));
-        let Some((place, _)) = first else { return Ok(None) };
-        let with_ordinary = beside.remove(place);
-        let best = fits.remove(place);
-        let losses = Losses {
-            before: before.loss,
-            with: best.loss,
-            ordinary: present.loss,
-            with_both: with_ordinary.loss,
-        };
-        let shows_beside_it = || with_ordinary.shows(present, &with_ordinary.newest(), worth_it);
-        if !losses.found(worth) || !(losses.replaces_ordinary() || shows_beside_it()) {
-            return Ok(None);
-        }
-        // Candidates that were not refitted with the nuisance terms are assumed to improve by the same factor as the best.
-        let gains = with_ordinary.loss / best.loss;
-        let mut others: Vec<Tried> = fits
-            .iter()
-            .enumerate()
-            .map(|(other, fitted)| {
-                fitted.tried(beside.get(other).map_or(gains * fitted.loss, |beside| beside.loss))
-            })
-            .collect();
-        others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-        let Tried { effect, model, loss: loss_after } = best.tried(with_ordinary.loss);
-        let without = if losses.replaces_ordinary() { before } else { present };
-        let compared = [without, &with_ordinary].map(|fitted| fitted.solution.model.clone());
-        let chosen = Chosen { effect, model, loss_before: without.loss, loss_after, compared, others };
-        Ok(Some((chosen, with_ordinary, without)))
-    }
-
-    /// Removes effects that later ones make superfluous.
-    fn prune(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
-        if names(chosen) < 2 {
-            return Ok(());
-        }
-        self.progress.stage("testing each effect again", names(chosen) as u64);
-        let mut index = 0;
-        while index < chosen.len() && names(chosen) > 1 && !self.progress.interrupted() {
-            if is_further(chosen, index) {
-                index += 1;
-                continue;
-            }
-            let instances = instances(chosen, index);
-            let (layout, without) = present.without(&instances);
-            let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
-            let bare = self.without_exhausted(&rest)?;
-            self.progress.advance(1);
-            let is_worth = |without, with| POLICY.worth_naming(without, with);
-            let is_worth_its_place = present.shows(&bare, &chosen[index].effect, is_worth)
-                && self.is_no_parameter(&bare, present, present.layout.first_found() + index)?;
-            if is_worth_its_place {
-                chosen[index].stands(&bare, present);
-                index += 1;
-            } else {
-                remove(chosen, &instances);
-                *present = rest;
-            }
-        }
-        Ok(())
-    }
-
     /// Fits the nominal parameters and the parameters of all effects that are not in the rig file.
     fn fit(&self, layout: Layout, model: &JointModel, rounds: &[f64]) -> Result<Fitted, Failure> {
         let free = layout.free(self.believed, model);
@@ -560,11 +420,6 @@ impl Search<'_> {
         let stretch_losses = self.objective.stretch_losses(&solution.residuals);
         Fitted { layout, solution, loss, stretch_losses, finished, unseen: false }
     }
-}
-
-/// Number of named effects; instances of one effect on one component count once.
-fn names(chosen: &[Chosen]) -> usize {
-    (0..chosen.len()).filter(|index| !is_further(chosen, *index)).count()
 }
 
 /// Whether the effect at `index` is a further instance of one before it.

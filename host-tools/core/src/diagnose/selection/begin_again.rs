@@ -3,7 +3,7 @@
 //! A greedy search fails where each of several effects reduces the loss little unless the others are present: friction that grows with the
 //! square of the load, for example, without the dry friction next to it. A large remaining loss is the sign of it.
 
-use super::{Attempted, Chosen, Fitted, PROMISING, Round, Search, Tried, handicap};
+use super::{Attempted, Chosen, Explanation, Fitted, PROMISING, Round, Search, Tried, handicap};
 use crate::diagnose::policy::{POLICY, Policy};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -23,41 +23,41 @@ impl Search<'_> {
     pub(super) fn begin_again(
         &self,
         nothing: &Fitted,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
+        now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
-        let (rivals, most, own) = match chosen.first() {
+        let (rivals, most, own) = match now.chosen.first() {
             Some(first) => {
                 let own = Tried { effect: first.effect, model: first.model.clone(), loss: first.loss_after };
                 (first.others.clone(), RIVALS, Some(own))
             }
             None => (beginnings(nothing, rounds), BEGINNINGS, None),
         };
-        let mut best: Option<(Fitted, Vec<Chosen>)> = None;
+        let mut best: Option<Explanation> = None;
         for (place, rival) in rivals.iter().take(most).enumerate() {
             if self.progress.interrupted() {
                 return Ok(false);
             }
             let (layout, with) = nothing.layout.with(&nothing.solution.model, rival.effect);
-            let mut other = self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
-            if !self.is_no_parameter(nothing, &other, other.newest_place())? {
+            let fit = self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?;
+            if !self.is_no_parameter(nothing, &fit, fit.newest_place())? {
                 continue;
             }
             let rest = rivals.iter().enumerate().filter(|(other, _)| *other != place);
             let mut others: Vec<Tried> = rest.map(|(_, tried)| tried.clone()).collect();
             others.extend(own.clone());
             others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-            let mut others_chosen = vec![Chosen::newest_of(&other, nothing, others)];
-            self.add_names(&mut other, &mut others_chosen, rounds, Policy::worth_naming)?;
-            if best.as_ref().is_none_or(|(best, _)| other.loss < best.loss) {
-                best = Some((other, others_chosen));
+            let chosen = vec![Chosen::newest_of(&fit, nothing, others)];
+            let mut other = Explanation { fit, chosen };
+            self.add_names(&mut other, rounds, Policy::worth_naming)?;
+            if best.as_ref().is_none_or(|best| other.fit.loss < best.fit.loss) {
+                best = Some(other);
             }
         }
-        if let Some((other, others_chosen)) = best
-            && self.is_better((present, chosen), (&other, &others_chosen))?
+        if let Some(other) = best
+            && self.is_better(now, &other)?
         {
-            (*present, *chosen) = (other, others_chosen);
+            *now = other;
             return Ok(true);
         }
         Ok(false)
@@ -66,19 +66,16 @@ impl Search<'_> {
     /// Whether the effects of a restart replace the present ones. Each effect of either set is necessary within its set. With enough
     /// recordings for cross-validation the set that predicts better wins; otherwise, or if no effect was found before, the new set must
     /// reduce the loss by what a name must achieve.
-    fn is_better(
-        &self,
-        (present, chosen): (&Fitted, &[Chosen]),
-        (other, others_chosen): (&Fitted, &[Chosen]),
-    ) -> Result<bool, Failure> {
-        if chosen.is_empty() || !self.recordings_judge_one_another() {
+    fn is_better(&self, now: &Explanation, other: &Explanation) -> Result<bool, Failure> {
+        let [here, there] = [now, other].map(|one| handicap_of_all(&one.chosen));
+        let (now, other, is_first) = (&now.fit, &other.fit, now.chosen.is_empty());
+        if is_first || !self.recordings_judge_one_another() {
             let is_worth = |without, with| POLICY.worth_naming(without, with);
-            return Ok(other.shows(present, &other.newest(), is_worth)
-                && self.holds_across_recordings(present, other, is_worth)?);
+            return Ok(other.shows(now, &other.newest(), is_worth)
+                && self.holds_across_recordings(now, other, is_worth)?);
         }
-        let [here, there] = [chosen, others_chosen].map(handicap_of_all);
         let better = |loss: f64, others_loss: f64| there * others_loss < here * loss;
-        Ok(better(present.loss, other.loss) && self.holds_across_recordings(present, other, better)?)
+        Ok(better(now.loss, other.loss) && self.holds_across_recordings(now, other, better)?)
     }
 }
 

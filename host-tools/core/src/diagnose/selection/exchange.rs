@@ -5,7 +5,7 @@
 
 use bowden_model::effect::{ActiveEffect, Component};
 
-use super::{Chosen, Fitted, Search, Tried, handicap, instances, is_further, remove};
+use super::{Chosen, Explanation, Fitted, Search, Tried, handicap, instances, is_further, remove};
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -15,23 +15,19 @@ const RIVALS: usize = 3;
 
 impl Search<'_> {
     /// Refits the rivals of every effect but the last in its place, and keeps the best.
-    pub(super) fn exchange(&self, present: &mut Fitted, chosen: &mut Vec<Chosen>) -> Result<(), Failure> {
-        let last = (0..chosen.len()).rfind(|index| !is_further(chosen, *index)).unwrap_or(0);
+    pub(super) fn exchange(&self, now: &mut Explanation) -> Result<(), Failure> {
+        let last = (0..now.chosen.len()).rfind(|index| !is_further(&now.chosen, *index)).unwrap_or(0);
         // A replacement is appended, so that the places of the effects before it do not change.
         for index in (0..last).rev() {
-            if !is_further(chosen, index) && !self.progress.interrupted() {
-                self.exchange_one(index, present, chosen)?;
+            if !is_further(&now.chosen, index) && !self.progress.interrupted() {
+                self.exchange_one(index, now)?;
             }
         }
         Ok(())
     }
 
-    fn exchange_one(
-        &self,
-        index: usize,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
-    ) -> Result<(), Failure> {
+    fn exchange_one(&self, index: usize, now: &mut Explanation) -> Result<(), Failure> {
+        let Explanation { fit: present, chosen } = now;
         let mut rivals = self.rivals_beside_the_rest(index, present, chosen)?;
         if rivals.is_empty() || self.progress.interrupted() {
             return Ok(());

@@ -1,7 +1,7 @@
 //! Selection of laws, in place of named effects or in addition to them. Laws are tried once no further effect is found, and must reduce the
 //! loss by more than an effect must.
 
-use super::{Chosen, Fitted, Kind, PROMISING, Round, Search, Worth};
+use super::{Explanation, Fitted, Kind, PROMISING, Round, Search, Worth};
 use crate::diagnose::policy::{POLICY, Policy};
 use crate::diagnose::unexplained::unexplained;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -18,14 +18,13 @@ impl Search<'_> {
     pub(super) fn with_laws(
         &self,
         nothing: &Fitted,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
+        now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<(), Failure> {
-        if self.law_in_place_of_names(nothing, present, chosen, rounds)? {
-            self.add_names(present, chosen, rounds, Policy::worth_naming)?;
+        if self.law_in_place_of_names(nothing, now, rounds)? {
+            self.add_names(now, rounds, Policy::worth_naming)?;
         }
-        self.add_laws(present, chosen, rounds)
+        self.add_laws(now, rounds)
     }
 
     /// Replaces all named effects, or all but the first, by one law that predicts clearly better, and returns whether it did. Against one
@@ -34,10 +33,10 @@ impl Search<'_> {
     fn law_in_place_of_names(
         &self,
         nothing: &Fitted,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
+        now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
+        let Explanation { fit: present, chosen } = now;
         for kept in 0..chosen.len().min(2) {
             let replaced = &chosen[kept..];
             let several = replaced.len() > 1;
@@ -71,19 +70,14 @@ impl Search<'_> {
 
     /// Adds laws that reach their threshold, and removes effects that a law makes superfluous: such an effect was only the nearest
     /// entry of the catalogue.
-    fn add_laws(
-        &self,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
-        rounds: &mut Vec<Round>,
-    ) -> Result<(), Failure> {
+    fn add_laws(&self, now: &mut Explanation, rounds: &mut Vec<Round>) -> Result<(), Failure> {
         for _ in 0..MOST_LAWS {
-            if self.progress.interrupted() || !POLICY.worth_stating(present.loss, 0.0) {
+            if self.progress.interrupted() || !POLICY.worth_stating(now.fit.loss, 0.0) {
                 break;
             }
             // If a free form has already located a remaining structure, a law of that component needs no more than an effect.
-            let left = unexplained(self.objective, None, &present.solution.model)?;
-            let before = self.without_exhausted(present)?;
+            let left = unexplained(self.objective, None, &now.fit.solution.model)?;
+            let before = self.without_exhausted(&now.fit)?;
             let (record, fits) = self.one_more(&before, Kind::Law, PROMISING)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
             let there = |fitted: &Fitted| {
@@ -92,12 +86,12 @@ impl Search<'_> {
             };
             let worth: Worth =
                 if fits.first().is_some_and(there) { Policy::worth_naming } else { Policy::worth_stating };
-            let Some((found, with)) = self.found(&before, present, fits, worth)? else { break };
-            chosen.push(found);
-            *present = with;
-            self.prune(present, chosen)?;
+            let Some((found, with)) = self.found(&before, &now.fit, fits, worth)? else { break };
+            now.chosen.push(found);
+            now.fit = with;
+            self.prune(now)?;
             // Beside the law an effect may show that is worth little without it.
-            self.add_names(present, chosen, rounds, Policy::worth_naming_in_doubt)?;
+            self.add_names(now, rounds, Policy::worth_naming_in_doubt)?;
         }
         Ok(())
     }

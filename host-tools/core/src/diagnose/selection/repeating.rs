@@ -7,7 +7,7 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::search::Starts;
 
-use super::{Chosen, Fitted, Search, is_further};
+use super::{Chosen, Explanation, Fitted, Search, is_further};
 use crate::diagnose::layout::Layout;
 use crate::diagnose::locked::{Pattern, further_pattern, too_little_travel};
 use crate::diagnose::policy::POLICY;
@@ -29,11 +29,8 @@ const PROMISING_INSTANCE: f64 = 0.01;
 
 impl Search<'_> {
     /// Adds further instances of every effect that may have several, if they improve the fit.
-    pub(super) fn add_instances(
-        &self,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
-    ) -> Result<(), Failure> {
+    pub(super) fn add_instances(&self, now: &mut Explanation) -> Result<(), Failure> {
+        let Explanation { fit: present, chosen } = now;
         for index in 0..chosen.len() {
             let effect = chosen[index].effect;
             if is_further(chosen, index) || effect.effect.instances_differ_in().is_none() {

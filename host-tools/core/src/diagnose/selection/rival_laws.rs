@@ -9,7 +9,9 @@ use bowden_model::law;
 
 use super::laws::RIVALLING;
 use super::loudest::without_the_loudest;
-use super::{Chosen, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, remove};
+use super::{
+    Chosen, Explanation, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, remove,
+};
 use crate::diagnose::candidates::Candidate;
 use crate::diagnose::law_candidates::law_candidates;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -21,24 +23,24 @@ impl Search<'_> {
     pub(super) fn replace_by_laws(
         &self,
         nothing: &Fitted,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
+        now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
         let mut replaced = false;
-        for group in imitators(chosen) {
+        for group in imitators(&now.chosen) {
             if self.progress.interrupted() {
                 return Ok(replaced);
             }
+            let chosen = now.chosen.iter().enumerate();
             let places: Vec<usize> =
-                (0..chosen.len()).filter(|place| group.contains(&chosen[*place].effect)).collect();
+                chosen.filter(|(_, one)| group.contains(&one.effect)).map(|(place, _)| place).collect();
             // A law may have replaced one of them together with others.
             if places.len() == group.len() {
-                replaced |= self.compare_one(&places, nothing, present, chosen, rounds)?;
+                replaced |= self.compare_one(&places, nothing, now, rounds)?;
             }
         }
         if replaced {
-            self.prune(present, chosen)?;
+            self.prune(now)?;
         }
         Ok(replaced)
     }
@@ -48,10 +50,10 @@ impl Search<'_> {
         &self,
         places: &[usize],
         nothing: &Fitted,
-        present: &mut Fitted,
-        chosen: &mut Vec<Chosen>,
+        now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
+        let Explanation { fit: present, chosen } = now;
         let rest = if places.len() == chosen.len() {
             nothing.clone()
         } else {
@@ -199,14 +201,15 @@ mod tests {
         let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP, FINE_STEP]).unwrap();
         let start = (nothing.layout.clone(), nothing.solution.model.clone());
         let (layout, with) = names.iter().fold(start, |(layout, model), name| layout.with(&model, *name));
-        let mut present = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
-        let mut found: Vec<Chosen> = present.solution.model.effects[present.layout.first_found()..]
+        let fit = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let chosen = fit.solution.model.effects[fit.layout.first_found()..]
             .iter()
-            .map(|effect| Chosen { effect: *effect, ..Chosen::newest_of(&present, &nothing, Vec::new()) })
+            .map(|effect| Chosen { effect: *effect, ..Chosen::newest_of(&fit, &nothing, Vec::new()) })
             .collect();
-        search.replace_by_laws(&nothing, &mut present, &mut found, &mut Vec::new()).unwrap();
-        assert_eq!(found.len(), present.solution.model.effects.len() - present.layout.first_found());
-        found
+        let mut now = Explanation { fit, chosen };
+        search.replace_by_laws(&nothing, &mut now, &mut Vec::new()).unwrap();
+        assert_eq!(now.chosen.len(), now.fit.solution.model.effects.len() - now.fit.layout.first_found());
+        now.chosen
     }
 
     /// 0.01 of the square of a tension between 20 and 40 N, of which a straight line leaves up to 0.5 N.

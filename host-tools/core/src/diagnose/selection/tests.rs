@@ -5,11 +5,9 @@ use bowden_model::effects::find;
 use nalgebra::DMatrix;
 
 use super::{
-    Asked, Chosen, Fitted, Losses, POLICY, Selected, Tried, handicap, largest_ordinary, law, negligible,
-    select,
+    Asked, Chosen, Fitted, POLICY, Selected, Tried, handicap, largest_ordinary, law, negligible, select,
 };
 use crate::diagnose::layout::Layout;
-use crate::diagnose::policy::Policy;
 use crate::fit::objective::{Objective, Residuals};
 use crate::fit::solver::Solution;
 use crate::joint_model::JointModel;
@@ -189,30 +187,6 @@ fn a_form_that_is_not_the_usual_one_has_to_be_worth_its_choice() {
     let square = gear.with("exponent", 2.0);
     for (left, square_wins) in [(0.86, false), (0.84, true)] {
         assert_eq!(left * handicap(&square) < handicap(&gear), square_wins, "{left}");
-    }
-}
-
-#[test]
-fn what_stands_beside_an_ordinary_effect_or_in_its_place_is_found() {
-    for (losses, found) in [
-        // Nothing was left out.
-        ([1.0, 0.8, 1.0, 0.8], true),
-        ([1.0, 0.9, 1.0, 0.9], false),
-        // Dry friction beyond the ordinary: it takes the place of that.
-        ([1.2, 0.6, 0.7, 0.6], true),
-        // Viscous friction beside dry friction, neither of which does alone.
-        ([1.03, 0.71, 0.67, 0.48], true),
-        // What imitates the ordinary, does no better and adds nothing.
-        ([1.03, 0.71, 0.67, 0.65], false),
-        // What helps beside it and does nothing alone is taken for chance.
-        ([1.03, 1.0, 0.67, 0.48], false),
-    ] {
-        let [before, with, ordinary, with_both] = losses;
-        assert_eq!(
-            Losses { before, with, ordinary, with_both }.found(Policy::worth_naming),
-            found,
-            "{losses:?}"
-        );
     }
 }
 
