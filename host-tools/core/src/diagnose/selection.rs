@@ -37,7 +37,7 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 pub use hypotheses::{BestRival, Trial};
-use loudest::without_the_loudest;
+use loudest::{without_the_loudest, without_the_loudest_moment};
 
 /// Number of candidates that are fitted to convergence.
 const FINALISTS: usize = 3;
@@ -267,7 +267,7 @@ pub fn compare_with_laws(
         model = now.fit.without_ordinary();
     }
     let (Explanation { fit: present, chosen }, complete) = (now, !progress.interrupted());
-    Ok(Selected { chosen, present, nothing, rounds, model, complete, ..selected })
+    Ok(Selected { model, chosen, rounds, complete, nothing, present, ..selected })
 }
 
 /// Removes rivals that were selected as well.
@@ -325,7 +325,8 @@ impl Fitted {
     }
 
     /// Whether `effect`, which `before` lacks, reaches the threshold `worth`, and is visible also without the data that support it most: an
-    /// effect of the catalogue at all, a law by the same share, because one of its many forms can fit a few moments by chance.
+    /// effect of the catalogue at all, without one moment or, if it begins at a moment, without the most favourable ones; a law without these
+    /// by the same share, because one of its many forms can fit a few moments by chance.
     fn shows(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
         let is_law = law::of(effect).is_some();
         let begins_at_a_moment = moment_of(effect).is_some();
@@ -337,7 +338,9 @@ impl Fitted {
                     POLICY.shows_elsewhere(*without, *with, begins_at_a_moment)
                 }
         };
-        let quieter = without_the_loudest(&before.stretch_losses, &self.stretch_losses);
+        let quieter_without =
+            if is_law || begins_at_a_moment { without_the_loudest } else { without_the_loudest_moment };
+        let quieter = quieter_without(&before.stretch_losses, &self.stretch_losses);
         worth(before.loss, self.loss) && quieter.iter().all(elsewhere)
     }
 

@@ -223,3 +223,24 @@ fn what_is_idle_most_of_the_time_shows_and_a_law_as_much_elsewhere_too() {
         assert_eq!(with.shows(&before, &effect, worth), shows, "{id}, {elsewhere} times {scale}");
     }
 }
+
+/// A stop that is touched in four seconds of forty, at three moments. An effect that begins at a moment, and a law, could be adapted to those.
+#[test]
+fn what_acts_at_a_few_moments_shows_unless_it_is_adapted_to_them() {
+    let bench = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
+    let fitted = |at_the_stop: f64| {
+        let of = |second| if [8, 9, 14, 32].contains(&second) { at_the_stop } else { 1.0 };
+        let stretch_losses = (0..40).map(|second| ((0, second), [of(second), 1.0])).collect();
+        let loss = 0.1 * at_the_stop + 0.9;
+        Fitted { loss, stretch_losses, ..fitted((Layout::of(&bench), bench.clone())) }
+    };
+    let worth = |without, with| POLICY.worth_naming(without, with);
+    for (effect, shows) in [
+        (find("end_stop_contact").unwrap(), true),
+        (find("payload_change").unwrap(), false),
+        (bowden_model::law::find("law_joint_torque_at_a_place").unwrap(), false),
+    ] {
+        let effect = ActiveEffect::with_defaults(effect);
+        assert_eq!(fitted(1.0).shows(&fitted(31.0), &effect, worth), shows, "{}", effect.descriptor().id);
+    }
+}
