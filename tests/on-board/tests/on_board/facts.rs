@@ -9,7 +9,7 @@ use bowden_on_board_tests::tool::{Plugged, Ran, run_alone};
 use bowden_on_board_tests::{Outcome, image};
 use serde_json::{Value, json};
 
-/// What a command stated that ended with `status` and had nothing to say on standard error.
+/// What a command stated, which has to succeed with nothing to say on standard error.
 fn stated(ran: &Ran) -> Value {
     assert_eq!((ran.status, ran.errors.as_str()), (Some(0), ""), "{ran:?}");
     serde_json::from_str(&ran.output).expect("JSON")
@@ -65,14 +65,14 @@ fn a_recording_and_what_is_computed_of_it_have_the_same_rows() -> Outcome {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();
     let mut board = Plugged::new(Board::builder(&image::firmware()?).build()?)?;
-    let port = board.port();
-    let record = ["record", "--port", &port, "--timeout", "600", "--raw", "--home", "--json"];
+    let record = board.arguments("record");
+    let record: Vec<&str> = record.iter().map(String::as_str).collect();
+    let how = ["--raw", "--home", "--json", "--out", "a.mcap"];
     let run = ["--reference", "sine", "--amplitude", "0.2", "--frequency", "1", "--seconds", "1"];
     let mut largest_rad = 0.0_f64;
-    let recorded =
-        board.run_in_beside(place, &[&record[..], &run, &["--out", "a.mcap"]].concat(), |board| {
-            largest_rad = largest_rad.max(board.bench().theta_out_rad());
-        })?;
+    let recorded = board.run_in_beside(place, &[&record[..], &how, &run].concat(), |board| {
+        largest_rad = largest_rad.max(board.bench().theta_out_rad());
+    })?;
     let recorded = stated(&recorded);
 
     let recording = Recording::load(&place.join("a.mcap"), &ReadOptions::default()).expect("a recording");

@@ -10,9 +10,10 @@ fn a_recording_of_a_killed_program_is_recovered_and_computed_again() -> Outcome 
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();
     let mut board = Plugged::new(Board::builder(&image::firmware()?).build()?)?;
-    let port = board.port();
-    let record = ["record", "--port", &port, "--timeout", "600", "--raw", "--home", "--out", "a.mcap"];
-    let running = board.start(place, &[&record[..], &["--reference", "sine"]].concat())?;
+    let record = board.arguments("record");
+    let record: Vec<&str> = record.iter().map(String::as_str).collect();
+    let run = ["--raw", "--home", "--out", "a.mcap", "--reference", "sine"];
+    let running = board.start(place, &[&record[..], &run].concat())?;
     let path = place.join("a.mcap");
     let long = || std::fs::metadata(&path).is_ok_and(|file| file.len() > 300_000);
     board.attend("rows", || long() || running.has_ended())?;

@@ -22,7 +22,7 @@ type Pair = ([f64; 2], [f64; 2]);
 /// that leaves out the recordings with the largest reduction.
 pub(super) fn without_the_loudest(without: &StretchLosses, with: &StretchLosses) -> Vec<[f64; 2]> {
     let stretches = of_units(without.values().copied().zip(with.values().copied()).collect());
-    [Some(stretches), without_the_loudest_recording(without, with)].into_iter().flatten().collect()
+    and_of_recordings(stretches, without, with)
 }
 
 /// The same, leaving out as many stretches that follow one another in one recording. If none is that long, there are so many recordings that
@@ -38,12 +38,17 @@ pub(super) fn without_the_loudest_moment(without: &StretchLosses, with: &Stretch
     let is_left = |place: usize| loudest.is_none_or(|first| !(first..first + length).contains(&place));
     let stretches =
         means(pairs.iter().enumerate().filter(|(place, _)| is_left(*place)).map(|(_, pair)| pair));
-    [Some(stretches), without_the_loudest_recording(without, with)].into_iter().flatten().collect()
+    and_of_recordings(stretches, without, with)
 }
 
-fn without_the_loudest_recording(without: &StretchLosses, with: &StretchLosses) -> Option<[f64; 2]> {
+/// `stretches`, and for several recordings the losses without the loudest of these.
+fn and_of_recordings(stretches: [f64; 2], without: &StretchLosses, with: &StretchLosses) -> Vec<[f64; 2]> {
+    let mut quieter = vec![stretches];
     let [without, with] = [without, with].map(by_recording);
-    (without.len() >= SEVERAL).then(|| of_units(without.into_values().zip(with.into_values()).collect()))
+    if without.len() >= SEVERAL {
+        quieter.push(of_units(without.into_values().zip(with.into_values()).collect()));
+    }
+    quieter
 }
 
 fn by_recording(stretches: &StretchLosses) -> BTreeMap<usize, [f64; 2]> {

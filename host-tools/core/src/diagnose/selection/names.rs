@@ -1,4 +1,5 @@
-//! Selection of named effects: added one by one, exchanged with their rivals, and removed where later ones make them superfluous.
+//! Steps of the selection, forward and backward: named effects are added one by one, and removed where later ones make them superfluous. Laws
+//! are judged by the same steps.
 
 use rayon::prelude::*;
 
