@@ -7,6 +7,7 @@ use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterA
 
 use crate::accesses::Accesses;
 use crate::bus::Bus;
+use crate::code_pages;
 use crate::elf::Image;
 use crate::error::BoardError;
 use crate::exceptions;
@@ -29,16 +30,25 @@ const SOFTWARE_INTERRUPT: u32 = 2;
 /// Interrupt number by which Unicorn reports BKPT.
 const BREAKPOINT: u32 = 7;
 /// EPSR of code outside of an IT block.
-const THUMB: u64 = 1 << 24;
+pub(crate) const THUMB: u64 = 1 << 24;
 /// Time between two looks at the log buffer \[s\].
 const LOG_POLL_S: f64 = 0.5e-3;
 
-type Uc<'a> = Unicorn<'a, Machine>;
+pub(crate) type Uc<'a> = Unicorn<'a, Machine>;
 
 /// What there is of RAM. The CCM SRAM stands at one of its two places, where the image has it: the other one is then a bus fault, so
 /// that no byte is used under two addresses.
 fn rams(image: &Image) -> Vec<Region> {
     if image.ccm_behind_sram2 { vec![RAM] } else { vec![RAM_WITHOUT_CCM, CCM] }
+}
+
+/// First and last addresses of what lies before, between and behind `regions`, none of which begins where another ends. Over these alone
+/// accesses can be invalid, and where one that is invalid is looked for, the simulator takes the slow way through every store.
+fn around(mut regions: Vec<Region>) -> Vec<(u64, u64)> {
+    regions.sort_by_key(|region| region.start);
+    let first = std::iter::once(0).chain(regions.iter().map(|region| u64::from(region.end())));
+    let last = regions.iter().map(|region| u64::from(region.start) - 1).chain([u64::MAX]);
+    first.zip(last).collect()
 }
 
 /// Reads a word of memory.
@@ -72,6 +82,7 @@ impl Cpu {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB | Mode::MCLASS, Machine::new(image, bus))?;
         uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
         map_memories(&mut uc)?;
+        code_pages::watch(&mut uc)?;
         add_hooks(&mut uc)?;
         let lowest_stack_pointer = uc.get_data().image.stack_top;
         let mut cpu = Self { uc, rtt, next_log_s: 0.0, boots: 0, dead: None, lowest_stack_pointer };
@@ -570,16 +581,18 @@ fn add_hooks(uc: &mut Uc<'_>) -> Result<(), BoardError> {
         let _ = uc.emu_stop();
         true
     })?;
-    uc.add_mem_hook(HookType::MEM_INVALID, 1, 0, |uc, kind, address, size, _| {
-        let link = uc.reg_read(R::LR).unwrap_or(0) as u32;
-        let cause = match kind {
-            MemType::FETCH | MemType::FETCH_UNMAPPED | MemType::FETCH_PROT => Cause::Fetch,
-            _ => Cause::DataAccess(address as u32),
-        };
-        let what = format!("{kind:?} of {size} bytes at {address:#010x}");
-        uc.get_data_mut().processor_fault(cause, what, link);
-        false
-    })?;
+    for (first, last) in around(rams(&uc.get_data().image)) {
+        uc.add_mem_hook(HookType::MEM_INVALID, first, last, |uc, kind, address, size, _| {
+            let link = uc.reg_read(R::LR).unwrap_or(0) as u32;
+            let cause = match kind {
+                MemType::FETCH | MemType::FETCH_UNMAPPED | MemType::FETCH_PROT => Cause::Fetch,
+                _ => Cause::DataAccess(address as u32),
+            };
+            let what = format!("{kind:?} of {size} bytes at {address:#010x}");
+            uc.get_data_mut().processor_fault(cause, what, link);
+            false
+        })?;
+    }
     hook_instructions(uc)
 }
 

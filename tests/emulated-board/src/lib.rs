@@ -37,6 +37,7 @@ mod analog;
 mod board;
 mod bus;
 mod clock;
+mod code_pages;
 mod cost;
 mod cpu;
 mod elf;

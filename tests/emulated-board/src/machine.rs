@@ -8,7 +8,7 @@ use crate::cost::{BlockCost, MOST_TAKEN, TAKEN, block_cost};
 use crate::elf::Image;
 use crate::error::{BoardError, Refusal};
 use crate::measure::{Measure, Moment};
-use crate::memory_map::{CORE, FLASH};
+use crate::memory_map::{CCM, CCM_BEHIND_SRAM2, CORE, FLASH};
 use crate::processor_fault::{Cause, ProcessorFault};
 use crate::scs::{FIRST_INTERRUPT, Scs};
 
@@ -115,6 +115,8 @@ pub(crate) struct Machine {
     /// Number, minimum, maximum and sum of cycles from an update event of TIM1 to the `ADC1_2` handler.
     pub tick_latency: [u64; 4],
     flash_costs: Vec<Cached>,
+    ccm_costs: Vec<Cached>,
+    ccm_start: u32,
     other_costs: HashMap<u32, Cached>,
 }
 
@@ -146,6 +148,8 @@ impl Machine {
             scs: Scs::new(FLASH.start),
             bus,
             flash_costs: vec![Cached::default(); used / 2 + 1],
+            ccm_costs: vec![Cached::default(); CCM.size as usize / 2],
+            ccm_start: if image.ccm_behind_sram2 { CCM_BEHIND_SRAM2 } else { CCM.start },
             other_costs: HashMap::new(),
             measure: Measure::default(),
             tick_latency: [0; 4],
@@ -183,10 +187,14 @@ impl Machine {
     }
 
     fn cached(&mut self, address: u32) -> &mut Cached {
-        let slot = (address.wrapping_sub(FLASH.start) / 2) as usize;
-        match self.flash_costs.get_mut(slot) {
-            Some(cached) => cached,
-            None => self.other_costs.entry(address).or_default(),
+        let slot = |start: u32| (address.wrapping_sub(start) / 2) as usize;
+        let (in_flash, in_ccm) = (slot(FLASH.start), slot(self.ccm_start));
+        if let Some(cached) = self.flash_costs.get_mut(in_flash) {
+            cached
+        } else if let Some(cached) = self.ccm_costs.get_mut(in_ccm) {
+            cached
+        } else {
+            self.other_costs.entry(address).or_default()
         }
     }
 
@@ -211,6 +219,7 @@ impl Machine {
 
     /// Forgets the costs of code outside flash: it may have been replaced.
     pub(crate) fn forget_ram_code(&mut self) {
+        self.ccm_costs.fill(Cached::default());
         self.other_costs.clear();
     }
 

@@ -520,3 +520,64 @@ fn code_runs_from_the_ccm_sram() {
     assert!(board.memory(0x1000_7ffc, 4).is_some() && board.memory(0x1000_8000, 4).is_none());
     assert!(board.memory(0x2001_7ffc, 4).is_some() && board.memory(0x2001_8000, 4).is_none());
 }
+
+/// Writes `movs r0, #42; bx lr` to 0x20000200 twice, calls it, puts 43 in place of 42, calls it, and puts 42 back; stores each result.
+const REPLACED: &[u16] = &[
+    0x4c08, // ldr r4, =0x20000200
+    0x4d09, // ldr r5, =0x4770202a
+    0x4e09, // ldr r6, =0x20000100
+    0x4f0a, // ldr r7, =0x4770202b
+    0x6025, // str r5, [r4]
+    0x6025, // str r5, [r4]
+    0x4623, // mov r3, r4
+    0x3301, // adds r3, #1
+    0x4798, // blx r3
+    0x6030, // str r0, [r6]
+    0x6027, // str r7, [r4]
+    0x4798, // blx r3
+    0x6070, // str r0, [r6, #4]
+    0x6025, // str r5, [r4]
+    0x4798, // blx r3
+    0x60b0, // str r0, [r6, #8]
+    0xe7fe, // b .
+    0xbf00, // nop
+    0x0200, 0x2000, // literals
+    0x202a, 0x4770, //
+    0x0100, 0x2000, //
+    0x202b, 0x4770, //
+];
+
+#[test]
+fn code_in_ram_that_is_replaced_after_it_ran_is_the_new_code() {
+    let mut board = board(REPLACED, &[], &[("main", 0, 36)]);
+    board.run_for(1e-4).expect("it runs");
+    assert_eq!(words(&board, 0x2000_0100, 3), [42, 43, 42]);
+}
+
+/// The first store to a page of RAM, inside an IT block; behind a branch, `movs` sets the flags that the next branch needs.
+const STORE_IN_IT_BLOCK: &[u16] = &[
+    0x4a06, // ldr r2, =0x20002000
+    0x4e07, // ldr r6, =0x20000100
+    0x2000, // movs r0, #0
+    0x2800, // cmp r0, #0
+    0xbf08, // it eq
+    0x6010, // streq r0, [r2]
+    0xe000, // b .+4
+    0xbf00, // nop
+    0x2001, // movs r0, #1
+    0xd100, // bne .+4
+    0xe7fe, // b .
+    0x6030, // str r0, [r6]
+    0xe7fe, // b .
+    0xbf00, // nop
+    0x2000, 0x2000, // literals
+    0x0100, 0x2000, //
+];
+
+/// Inside an IT block the same `movs` would leave the flags alone.
+#[test]
+fn an_it_block_ends_behind_its_instructions() {
+    let mut board = board(STORE_IN_IT_BLOCK, &[], &[("main", 0, 28)]);
+    board.run_for(1e-4).expect("it runs");
+    assert_eq!(words(&board, 0x2000_0100, 1), [1]);
+}
