@@ -119,6 +119,15 @@ fn commands_check_their_files_before_their_work() {
         .save(&at.join("rec.csv"))
         .unwrap();
     recording(&[Channel::ThetaIn, Channel::F1]).save(&at.join("other.csv")).unwrap();
+    // On a joint that turns with its motor this compares an angle with itself; beside a current or through tendons it does not.
+    let same_angle = "[recording.columns]\ntheta_out_rad = { column = \"theta_in_rad\" }\n";
+    fs::write(at.join("direct.toml"), rig_text(&[MOTOR, same_angle])).unwrap();
+    fs::write(at.join("driven.toml"), rig_text(&[MOTOR, same_angle, "[replay]\ninputs = [\"duty\"]\n"]))
+        .unwrap();
+    fs::write(at.join("both.toml"), rig_text(&[MOTOR, TENDON, same_angle])).unwrap();
+    recording(&[Channel::ThetaIn, Channel::Duty, Channel::MotorCurrent])
+        .save(&at.join("current.csv"))
+        .unwrap();
     // Only the inputs of this one can be read.
     fs::write(at.join("inputs.csv"), "t_s,theta_in_rad,f1_n\n0,0,NaN\n0.001,0,\n").unwrap();
 
@@ -127,6 +136,9 @@ fn commands_check_their_files_before_their_work() {
         "replay @/inputs.csv --rig @/rig.toml --out @/p.csv.gz",
         "fit @/rec.csv @/other.csv --rig @/rig.toml --out @/fitted.toml",
         "diagnose @/rec.csv --rig @/rig.toml --out @/new/folder --heldout @/other.csv",
+        "fit @/current.csv --rig @/direct.toml --out @/fitted.toml",
+        "fit @/rec.csv --rig @/driven.toml --out @/fitted.toml",
+        "fit @/rec.csv --rig @/both.toml --out @/fitted.toml",
         "simulate --rig @/rig.toml --out @/sim.csv --motion sine --seconds 1 --rate-hz 500 --seed 7",
         "simulate --rig @/rig.toml --out @/sim.mcap --reference @/rec.csv",
     ] {
@@ -150,6 +162,11 @@ fn commands_check_their_files_before_their_work() {
         (
             "fit @/rec.csv --rig @/rig.toml --out @/rig.toml",
             "@/rig.toml: would overwrite the input @/rig.toml; name another output",
+        ),
+        (
+            "fit @/rec.csv --rig @/direct.toml --out @/f.toml",
+            "@/rec.csv: column `theta_in_rad` drives the replay as theta_in_rad and is all that it is compared with, as theta_out_rad: \
+             without [tendon] that is the column itself; take theta_in_rad out of replay.inputs, or record i_motor_a as well",
         ),
         (
             "fit @/inputs.csv --rig @/rig.toml --out @/f.toml",

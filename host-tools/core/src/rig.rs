@@ -121,10 +121,23 @@ impl Rig {
     /// Makes a recording ready for a comparison with the rig, wherever it came from. What is repaired or dropped stands in its notes.
     ///
     /// # Errors
-    /// No column that could drive or judge a replay, fewer than [`MINIMUM_SAMPLES`], and magnitudes that tell of another unit.
+    /// No column that could drive or judge a replay, or only the one that drives it; fewer than [`MINIMUM_SAMPLES`]; magnitudes that tell of
+    /// another unit.
     pub fn accept(&self, recording: Recording) -> Result<Recording, Failure> {
         let roles = self.roles(&recording)?;
-        if !roles.outputs.iter().any(|channel| recording.channel(*channel).is_some()) {
+        let is_recorded = |channel: &&Channel| recording.channel(**channel).is_some();
+        let compared: Vec<Channel> = roles.outputs.iter().filter(is_recorded).copied().collect();
+        if let Some([input, output]) = self.compared_with_itself(&roles.inputs, &compared) {
+            let (column, _) = self.columns.channel(output);
+            let (input, output) = (input.role(), output.role());
+            return Err(Failure::bad_input(format!(
+                "{}: column `{}` drives the replay as {input} and is all that it is compared with, as {output}: without [tendon] that is \
+                 the column itself; take {input} out of replay.inputs, or record i_motor_a as well",
+                recording.source(),
+                column.column
+            )));
+        }
+        if compared.is_empty() {
             let names: Vec<&str> = roles.outputs.iter().map(|channel| channel.role()).collect();
             return Err(Failure::bad_input(format!(
                 "{}: no column to compare a simulation with, expected one of {}; record one, or map it under \
@@ -137,6 +150,17 @@ impl Rig {
         // Not for a replay, which answers every row that was recorded.
         recording.drop_frozen_rows();
         Ok(recording)
+    }
+
+    /// An input and an output of one column, on a joint that turns with what drives it, where every output is one of these.
+    fn compared_with_itself(&self, inputs: &[Channel], compared: &[Channel]) -> Option<[Channel; 2]> {
+        if self.joint.tendon.is_some() {
+            return None;
+        }
+        let column = |channel: Channel| self.columns.channel(channel).0.column;
+        let twin = |output: &Channel| inputs.iter().find(|input| column(**input) == column(*output)).copied();
+        let twins: Option<Vec<Channel>> = compared.iter().map(twin).collect();
+        twins?.first().zip(compared.first()).map(|(input, output)| [*input, *output])
     }
 
     /// Reads what a replay needs of a recording: `t_s` and the input roles, nothing else.
