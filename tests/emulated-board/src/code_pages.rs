@@ -5,9 +5,9 @@
 
 use std::collections::HashSet;
 
-use unicorn_engine::{MemType, Prot, RegisterARM as R, TlbEntry, TlbType};
+use unicorn_engine::{MemType, Prot, TlbEntry, TlbType};
 
-use crate::cpu::{THUMB, Uc};
+use crate::cpu::{Uc, leave_it_block};
 use crate::error::BoardError;
 use crate::memory_map::{CCM, RAM};
 
@@ -20,8 +20,7 @@ pub(crate) fn watch(uc: &mut Uc<'_>) -> Result<(), BoardError> {
             if fetched.insert(page) && uc.ctl_flush_tlb().is_err() {
                 return None;
             }
-        } else if uc.reg_write(R::EPSR, THUMB).is_err() {
-            // See `Cpu::count_accesses`: behind this hook, too, an IT block's state would be carried on.
+        } else if leave_it_block(uc).is_err() {
             return None;
         }
         let is_data = [RAM, CCM].iter().any(|ram| ram.contains(page as u32)) && !fetched.contains(&page);

@@ -3,7 +3,7 @@
 //! Time moves from basic block to basic block: an access to a peripheral sees the beginning of its block, and an
 //! interrupt is taken between two blocks. Unicorn's FPU is always on, so CPACR has no effect.
 
-use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM as R, Unicorn};
+use unicorn_engine::{Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM as R, Unicorn, uc_error};
 
 use crate::accesses::Accesses;
 use crate::bus::Bus;
@@ -30,7 +30,7 @@ const SOFTWARE_INTERRUPT: u32 = 2;
 /// Interrupt number by which Unicorn reports BKPT.
 const BREAKPOINT: u32 = 7;
 /// EPSR of code outside of an IT block.
-pub(crate) const THUMB: u64 = 1 << 24;
+const THUMB: u64 = 1 << 24;
 /// Time between two looks at the log buffer \[s\].
 const LOG_POLL_S: f64 = 0.5e-3;
 
@@ -40,6 +40,12 @@ pub(crate) type Uc<'a> = Unicorn<'a, Machine>;
 /// that no byte is used under two addresses.
 fn rams(image: &Image) -> Vec<Region> {
     if image.ccm_behind_sram2 { vec![RAM] } else { vec![RAM_WITHOUT_CCM, CCM] }
+}
+
+/// Ends the IT block that a hook on loads and stores finds itself in: for it the simulator puts back the state of the block, which its code does
+/// not keep up to date and would carry into the blocks that follow.
+pub(crate) fn leave_it_block(uc: &mut Uc<'_>) -> Result<(), uc_error> {
+    uc.reg_write(R::EPSR, THUMB)
 }
 
 /// First and last addresses of what lies before, between and behind `regions`, none of which begins where another ends. Over these alone
@@ -114,9 +120,7 @@ impl Cpu {
     pub(crate) fn count_accesses(&mut self, dma_items: u64) -> Result<(), BoardError> {
         self.uc.add_mem_hook(HookType::MEM_READ | HookType::MEM_WRITE, 1, 0, |uc, _, address, size, _| {
             uc.get_data_mut().count_access(address as u32, size as u32);
-            // For such a hook the simulator puts back the state of an IT block, which its code does not keep up to date and would
-            // carry into the blocks that follow.
-            uc.reg_write(R::EPSR, THUMB).is_ok()
+            leave_it_block(uc).is_ok()
         })?;
         let machine = self.machine_mut();
         machine.accesses = Some(Accesses::default());

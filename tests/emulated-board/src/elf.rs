@@ -55,6 +55,11 @@ fn bad(text: impl Into<String>) -> BoardError {
 }
 
 impl Image {
+    /// First address of the CCM SRAM, where the image has it.
+    pub(crate) fn ccm_start(&self) -> u32 {
+        if self.ccm_behind_sram2 { CCM_BEHIND_SRAM2 } else { CCM.start }
+    }
+
     /// Reads an ELF for a 32-bit ARM.
     pub(crate) fn parse(elf: &[u8]) -> Result<Self, BoardError> {
         let file = object::File::parse(elf).map_err(|error| {

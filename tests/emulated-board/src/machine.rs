@@ -8,7 +8,7 @@ use crate::cost::{BlockCost, MOST_TAKEN, TAKEN, block_cost};
 use crate::elf::Image;
 use crate::error::{BoardError, Refusal};
 use crate::measure::{Measure, Moment};
-use crate::memory_map::{CCM, CCM_BEHIND_SRAM2, CORE, FLASH};
+use crate::memory_map::{CCM, CORE, FLASH};
 use crate::processor_fault::{Cause, ProcessorFault};
 use crate::scs::{FIRST_INTERRUPT, Scs};
 
@@ -116,7 +116,6 @@ pub(crate) struct Machine {
     pub tick_latency: [u64; 4],
     flash_costs: Vec<Cached>,
     ccm_costs: Vec<Cached>,
-    ccm_start: u32,
     other_costs: HashMap<u32, Cached>,
 }
 
@@ -149,7 +148,6 @@ impl Machine {
             bus,
             flash_costs: vec![Cached::default(); used / 2 + 1],
             ccm_costs: vec![Cached::default(); CCM.size as usize / 2],
-            ccm_start: if image.ccm_behind_sram2 { CCM_BEHIND_SRAM2 } else { CCM.start },
             other_costs: HashMap::new(),
             measure: Measure::default(),
             tick_latency: [0; 4],
@@ -188,7 +186,7 @@ impl Machine {
 
     fn cached(&mut self, address: u32) -> &mut Cached {
         let slot = |start: u32| (address.wrapping_sub(start) / 2) as usize;
-        let (in_flash, in_ccm) = (slot(FLASH.start), slot(self.ccm_start));
+        let (in_flash, in_ccm) = (slot(FLASH.start), slot(self.image.ccm_start()));
         if let Some(cached) = self.flash_costs.get_mut(in_flash) {
             cached
         } else if let Some(cached) = self.ccm_costs.get_mut(in_ccm) {
