@@ -22,7 +22,7 @@ const RECORDING: &str = "t_s,theta_in_rad,theta_out_rad\n0,0,0\n0.001,0.01,0\n0.
 
 const BENCH: &str = include_str!("../../../host-tools/core/tests/rigs/bench.toml");
 const SERVO: &str = include_str!("../../../host-tools/studies/xl330-pendulum/xl330.toml");
-const DA_VINCI: &str = include_str!("../../../host-tools/rigs/davinci-T5L_3.toml");
+const DA_VINCI: &str = include_str!("../../real-data/rigs/davinci-T5L_3.toml");
 
 /// Everything that a rig file may have behind its sections.
 const EXTRAS: &str = r#"

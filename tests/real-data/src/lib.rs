@@ -9,12 +9,12 @@
 pub mod band_damper;
 pub mod cable_tool;
 pub mod cogging_motor;
-pub mod diagnosed;
 pub mod direct_drive;
 pub mod joint_fit;
 pub mod late;
 pub mod page;
 pub mod servo_pendulum;
+pub mod study;
 mod table;
 
 use std::fmt;
@@ -80,10 +80,10 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
     root_mean_square(values.iter().map(|value| value - middle))
 }
 
-/// A rig file of `rigs/`.
+/// A rig file that a reference fit starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RigFile {
-    /// Its name.
+    /// Where it is.
     pub name: &'static str,
     /// What it holds.
     pub text: &'static str,
@@ -95,14 +95,14 @@ impl RigFile {
     /// # Errors
     /// When the text is no rig.
     pub fn parse(self) -> Result<Rig, Failure> {
-        Rig::parse(self.text, &format!("rigs/{}", self.name))
+        Rig::parse(self.text, self.name)
     }
 }
 
-/// The [`RigFile`] of a name.
+/// The [`RigFile`] of a path from this package.
 macro_rules! rig_file {
-    ($name:literal) => {
-        $crate::RigFile { name: $name, text: include_str!(concat!("../../../host-tools/rigs/", $name)) }
+    ($path:literal) => {
+        $crate::RigFile { name: $path, text: include_str!(concat!("../", $path)) }
     };
 }
 use rig_file;
