@@ -1,8 +1,8 @@
-//! Scores on recordings of real benches, held out recording by recording.
+//! Scores on recordings of real benches that took no part in what is scored.
 //!
-//! A score counts only for a recording that the fit has not seen: every recording is left out once, all parameters are
-//! fitted to the others, and the left-out one is replayed. The physics itself was chosen by people who had seen all
-//! recordings; `host-tools/docs/real-recordings.md` says how far that reaches.
+//! [`study`] makes the diagnosis of a data set and replays what it held out. The other modules are what it is compared with, fits by people: every
+//! recording is left out once, all parameters are fitted to the others, and the left-out one is replayed. The physics of these fits was
+//! chosen by people who had seen all recordings; `host-tools/docs/real-recordings.md` says how far that reaches.
 
 #![forbid(unsafe_code)]
 
