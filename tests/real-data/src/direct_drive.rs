@@ -173,7 +173,7 @@ pub fn errors_rad(runs: &[Run], models: &[JointModel]) -> Result<Vec<f64>, Failu
 pub struct Shown {
     /// Largest reported torque, N·m.
     pub largest_nm: f64,
-    /// Share of the samples beyond [`SPIKE_NM`].
+    /// Share of the samples beyond 5 N·m.
     pub spikes: f64,
     /// Share of the torque's time integral, sign left out, in those samples.
     pub spike_share: f64,
