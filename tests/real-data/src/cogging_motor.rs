@@ -498,9 +498,8 @@ pub fn ripple_ratio(recordings: &Recordings) -> f64 {
 /// When the data set is missing or unusable.
 pub fn studies(data: &Path) -> Result<[RealStudy; 3], Failure> {
     let study = RealStudy::load(FOLDER, &data.join(FOLDER))?;
-    let [fast, slow] =
-        ["slow2__nocomp_0", "slow2_slower__nocomp_0"].map(|name| study.clone().judged_by(&[name]));
-    Ok([study, fast, slow])
+    let judged_by = |name| study.clone().judged_by(name);
+    Ok([study.clone(), judged_by("slow2__nocomp_0")?, judged_by("slow2_slower__nocomp_0")?])
 }
 
 /// Writes the tables and returns the marks.

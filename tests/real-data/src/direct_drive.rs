@@ -212,8 +212,8 @@ pub fn shown(data: &Path) -> Result<Vec<Shown>, Failure> {
 /// When the data set is missing or unusable.
 pub fn studies(data: &Path) -> Result<[RealStudy; 3], Failure> {
     let study = RealStudy::load(FOLDER, &data.join(FOLDER))?;
-    let [swing_up, position_loop] = ["swing-up", "position-loop"].map(|bench| study.clone().of_bench(bench));
-    Ok([swing_up, position_loop, study])
+    let alone = |bench| study.clone().of_bench(bench);
+    Ok([alone("swing-up")?, alone("position-loop")?, study])
 }
 
 /// Writes the tables and returns the mark.

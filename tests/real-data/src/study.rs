@@ -56,32 +56,45 @@ impl RealStudy {
         Ok(Self { loaded, asked: format!("bowden diagnose studies/{folder}/study.toml") })
     }
 
-    /// The same with the recordings of these names held out and no others.
-    #[must_use]
-    pub fn judged_by(mut self, heldout: &[&str]) -> Self {
+    /// The same with the recording of this name held out and no other.
+    ///
+    /// # Errors
+    /// When there is no such recording.
+    pub fn judged_by(mut self, heldout: &str) -> Result<Self, Failure> {
         for listed in &mut self.loaded.study.recordings {
-            let judges = heldout.contains(&name_of(&listed.recording).as_str());
+            let judges = name_of(&listed.recording) == heldout;
             listed.role = if judges { Role::HeldOut } else { Role::Training };
         }
         self.loaded.study.recordings.sort_by_key(|listed| listed.role);
-        self.asked = format!("{}, held out {}", self.asked, heldout.join(", "));
-        self
+        if self.heldout().next().is_none() {
+            return Err(Failure::bad_input(format!("{}: no recording {heldout}", self.asked)));
+        }
+        self.asked = format!("{}, held out {heldout}", self.asked);
+        Ok(self)
     }
 
     /// The same with one bench alone.
-    #[must_use]
-    pub fn of_bench(mut self, name: &str) -> Self {
+    ///
+    /// # Errors
+    /// When there is no such bench.
+    pub fn of_bench(mut self, name: &str) -> Result<Self, Failure> {
         let LoadedStudy { study, documents, .. } = &mut self.loaded;
-        let index = study.benches.iter().position(|bench| bench.name == name);
-        let kept = |other: usize| Some(other) == index;
-        study.recordings.retain(|listed| kept(listed.bench));
-        study.recordings.iter_mut().for_each(|listed| listed.bench = 0);
-        let mut place = 0..;
-        study.benches.retain(|_| place.next().is_some_and(kept));
-        let mut place = 0..;
-        documents.retain(|_| place.next().is_some_and(kept));
+        let Some(index) = study.benches.iter().position(|bench| bench.name == name) else {
+            return Err(Failure::bad_input(format!("{}: no bench {name}", self.asked)));
+        };
+        study.benches = vec![study.benches.swap_remove(index)];
+        *documents = vec![documents.swap_remove(index)];
+        study.recordings.retain(|listed| listed.bench == index);
+        for listed in &mut study.recordings {
+            listed.bench = 0;
+        }
         self.asked = format!("{}, bench {name} alone", self.asked);
-        self
+        Ok(self)
+    }
+
+    /// The recordings that are held out as a whole.
+    fn heldout(&self) -> impl Iterator<Item = &StudyRecording> {
+        self.loaded.study.recordings.iter().filter(|listed| listed.role == Role::HeldOut)
     }
 
     /// Numbers of benches and of recordings.
@@ -103,7 +116,7 @@ impl RealStudy {
         }
         let rigs: Vec<Rig> = documents.iter().map(RigDocument::rig).collect::<Result<_, _>>()?;
         let mut heldout = Vec::new();
-        for listed in study.recordings.iter().filter(|listed| listed.role == Role::HeldOut) {
+        for listed in self.heldout() {
             let rig = &study.benches[listed.bench].rig;
             let [stated, found] = [rig, &rigs[listed.bench]].map(|rig| errors(rig, listed));
             for ((channel, stated), (_, found)) in stated?.into_iter().zip(found?) {
@@ -252,5 +265,57 @@ impl Answer {
             table.row([name].into_iter().chain(values));
         }
         format!("{}\n{table}", lines.join("\n"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The servo's study, whose recordings are beside it.
+    fn servo() -> RealStudy {
+        RealStudy::load("xl330-pendulum", &studies().join("xl330-pendulum")).unwrap()
+    }
+
+    /// The diagnosis leaves its first 0.3 s out, and says 0.1580 rad. Without what a recording sets, gains would be wrong by up to eight.
+    #[test]
+    fn a_held_out_recording_is_replayed_with_what_it_sets() {
+        let study = servo();
+        let rig = &study.loaded.study.benches[0].rig;
+        let all: Vec<Error> = study.heldout().map(|listed| errors(rig, listed).unwrap()[0].1).collect();
+        assert_eq!(all.len(), 4);
+        let total = root_mean_square(all.iter().map(|error| error.root_mean_square));
+        assert!((total / 0.1580 - 1.0).abs() < 0.04, "{total}");
+        assert!(all.iter().all(|error| error.mean_absolute < error.root_mean_square), "{all:?}");
+    }
+
+    /// By hand: an angle that is 0.3 rad too large everywhere changes nothing where its zero is arbitrary.
+    #[test]
+    fn an_arbitrary_zero_is_no_error() {
+        let study = servo();
+        let listed = study.heldout().next().unwrap();
+        let mut rig = study.loaded.study.benches[0].rig.clone();
+        let mut shifted = listed.clone();
+        let angle = listed.recording.channel(Channel::ThetaOut).unwrap();
+        shifted.recording.set(Channel::ThetaOut, angle.iter().map(|theta| theta + 0.3).collect());
+        let of = |rig: &Rig, listed: &StudyRecording| errors(rig, listed).unwrap()[0].1.root_mean_square;
+        assert!(of(&rig, &shifted) > of(&rig, listed) + 0.1);
+        rig.free_offsets = vec![Channel::ThetaOut];
+        assert!((of(&rig, &shifted) - of(&rig, listed)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_study_is_judged_by_a_recording_and_has_a_bench_of_its_own() {
+        let judged = servo().judged_by("xl330_kp400_sin_sin_10h29m14").unwrap();
+        let names: Vec<String> = judged.heldout().map(|listed| name_of(&listed.recording)).collect();
+        assert_eq!(
+            (names.as_slice(), judged.size()),
+            (&["xl330_kp400_sin_sin_10h29m14".to_owned()][..], [1, 11])
+        );
+        assert_eq!(servo().of_bench("xl330").unwrap().size(), [1, 11]);
+        let refused = [servo().judged_by("ddp"), servo().of_bench("ddp")];
+        let reasons = refused.map(|refused| refused.unwrap_err().to_string());
+        let asked = "bowden diagnose studies/xl330-pendulum/study.toml";
+        assert_eq!(reasons, [format!("{asked}: no recording ddp"), format!("{asked}: no bench ddp")]);
     }
 }

@@ -264,11 +264,11 @@ pub fn plans(seed: u64) -> Vec<Plan> {
     }
     for number in 0..MANY {
         let plan = Plan::new(Group::Many, &format!("{number:02}"), seed);
-        plans.push(Plan { effects: many(4 + number % 2, plan.seed), ..plan });
+        plans.push(Plan { effects: many(4 + number % 2, plan.seed, &[]), ..plan });
     }
     for number in 0..GEOMETRY {
         let plan = Plan::new(Group::Geometry, &format!("{number:02}"), seed);
-        let effects = if number % 2 == 0 { Vec::new() } else { many(1, plan.seed) };
+        let effects = if number % 2 == 0 { Vec::new() } else { many(1, plan.seed, &[]) };
         plans.push(Plan { effects, off: wrong_geometry(plan.seed), ..plan });
     }
     for number in 0..MIXED {
@@ -286,7 +286,7 @@ pub fn plans(seed: u64) -> Vec<Plan> {
             let effects = if number % HIDING_NOTHING == 0 {
                 Vec::new()
             } else {
-                one_recorded(group.recorded(), plan.seed)
+                many(1, plan.seed, group.recorded().missing())
             };
             plans.push(Plan { effects, ..plan });
         }
@@ -295,31 +295,19 @@ pub fn plans(seed: u64) -> Vec<Plan> {
     plans
 }
 
-/// Effects of a clear size, at most two of a component.
-fn many(wanted: usize, seed: u64) -> Vec<(&'static str, f64)> {
+/// Effects of a clear size, at most two of a component and none of a sensor whose channel is `missing`: nobody could find that.
+fn many(wanted: usize, seed: u64, missing: &[&str]) -> Vec<(&'static str, f64)> {
     let mut draw = Draw::new(seed);
     let mut left = ids(false);
     let mut effects: Vec<(&'static str, Component)> = Vec::new();
     while effects.len() < wanted && !left.is_empty() {
         let drawn = left.swap_remove(draw.index(left.len()));
-        if effects.iter().filter(|(_, component)| *component == drawn.1).count() < 2 {
+        let has_room = effects.iter().filter(|(_, component)| *component == drawn.1).count() < 2;
+        if has_room && !is_of_a_channel(drawn.0, seed, missing) {
             effects.push(drawn);
         }
     }
     effects.into_iter().map(|(id, _)| (id, 1.0)).collect()
-}
-
-/// One effect of a clear size. Nobody could find what is wrong with a sensor whose channel is not recorded: such an effect is drawn again.
-fn one_recorded(recorded: Recorded, seed: u64) -> Vec<(&'static str, f64)> {
-    let mut draw = Draw::new(seed);
-    let mut left = ids(false);
-    while !left.is_empty() {
-        let (id, _) = left.swap_remove(draw.index(left.len()));
-        if !is_of_a_channel(id, seed, recorded.missing()) {
-            return vec![(id, 1.0)];
-        }
-    }
-    Vec::new()
 }
 
 /// Whether an effect, as it is drawn from a seed, is of the sensor of one of these channels.
@@ -515,7 +503,7 @@ mod tests {
             let missing = plan.group.recorded().missing();
             let Some((id, _)) = plan.effects.first().filter(|_| !missing.is_empty()) else { continue };
             assert!(!is_of_a_channel(id, plan.seed, missing), "{}: {id}", plan.name);
-            let first = many(1, plan.seed);
+            let first = many(1, plan.seed, &[]);
             if first == plan.effects {
                 kept += 1;
             } else {
