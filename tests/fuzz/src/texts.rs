@@ -22,7 +22,8 @@ const RECORDING: &str = "t_s,theta_in_rad,theta_out_rad\n0,0,0\n0.001,0.01,0\n0.
 
 const BENCH: &str = include_str!("../../../host-tools/core/tests/rigs/bench.toml");
 const SERVO: &str = include_str!("../../../host-tools/studies/xl330-pendulum/xl330.toml");
-const DA_VINCI: &str = include_str!("../../real-data/rigs/davinci-T5L_3.toml");
+const TOOL: &str = include_str!("../../../host-tools/studies/davinci-cable-tool/left.toml");
+const DAMPER: &str = include_str!("../../../host-tools/studies/band-friction-damper/damper.toml");
 
 /// Everything that a rig file may have behind its sections.
 const EXTRAS: &str = r#"
@@ -95,7 +96,7 @@ pub fn rig(bytes: &[u8]) {
 
 /// Rigs of every kind of section.
 pub fn rigs() -> Vec<Vec<u8>> {
-    let whole = [&[BENCH, EXTRAS][..], &[BENCH, POINTS], &[SERVO], &[DA_VINCI]];
+    let whole = [&[BENCH, EXTRAS][..], &[BENCH, POINTS], &[SERVO], &[TOOL], &[DAMPER]];
     whole.map(|parts| parts.concat().into_bytes()).into()
 }
 

@@ -10,12 +10,10 @@ use bowden_core::joint_model::JointModel;
 use bowden_core::outcome::Failure;
 use bowden_core::recording::ColumnSource;
 use bowden_model::channel::Channel;
-use bowden_model::effect::ActiveEffect;
-use bowden_model::effects::find;
 
 use super::joint_fit::{Fitted, Knob, Run, fit, leave_out, rmse_of};
 use super::study::{RealStudy, answers};
-use super::{Mark, RigFile, Table, listed_recordings, rig_file, root_mean_square};
+use super::{Mark, Table, listed_recordings, root_mean_square, with_values};
 
 /// Folder of the data set.
 pub const FOLDER: &str = "davinci-cable-tool";
@@ -32,16 +30,15 @@ pub const DIAGNOSED_LIMIT_RAD: f64 = 0.37 * std::f64::consts::PI / 180.0;
 /// Largest error of the input torque that the diagnosis may leave on recordings held out, N·m.
 pub const DIAGNOSED_LIMIT_NM: f64 = 0.010;
 
-/// Tools and their rigs.
-const RIGS: [(&str, RigFile); 4] = [
-    ("T4L_2", rig_file!("rigs/davinci-T4L_2.toml")),
-    ("T4L_4", rig_file!("rigs/davinci-T4L_4.toml")),
-    ("T4R_5", rig_file!("rigs/davinci-T4R_5.toml")),
-    ("T5L_3", rig_file!("rigs/davinci-T5L_3.toml")),
-];
+/// Benches of the study, in its order. Roll and pitch are wrist poses of one tool, which a fit cannot tell from `T4L_4`.
+const TOOLS: [&str; 4] = ["T4L_2", "T4L_4", "T4R_5", "T5L_3"];
 
-/// Recordings whose name is not that of a tool: wrist poses of one tool, which a fit cannot tell from `T4L_4`.
-const SAME_TOOL: [(&str, &str); 2] = [("T4L_Roll", "T4L_4"), ("T4L_Pitch", "T4L_4")];
+/// Effects that people chose, with the values where fits start.
+const EFFECTS: [(&str, &[(&str, f64)]); 3] = [
+    ("motor_coulomb_friction", &[("torque_nm", 0.02)]),
+    ("tendon_slack", &[("looseness_m", 6e-5)]),
+    ("joint_coulomb_friction", &[("torque_nm", 0.02)]),
+];
 
 /// Start-up transient that the source advises to drop, s.
 const LEAD_IN_S: f64 = 1.0;
@@ -120,14 +117,14 @@ impl Physics {
         }
     }
 
-    /// Replaces fitted values of the rig by round guesses, the same for all tools, so that no fit starts from what all
-    /// recordings told, and takes out what this physics lacks.
+    /// Adds the effects of this physics to a rig of the study, with loose cables; all at round guesses, the same for all tools.
     fn prepare(self, model: &mut JointModel) {
         let parameters = &mut model.parameters;
         if let (Some(pulleys), Some(tendon), Some(sheath)) =
             (&mut parameters.pulleys, &mut parameters.tendon, &mut parameters.sheath)
         {
             pulleys.input_radius_m = 0.9 * pulleys.output_radius_m;
+            tendon.pretension_n = 0.01;
             // 1.5 N·m/rad of one cable at the jaw.
             tendon.axial_stiffness_n = 1.5 * tendon.length_m / pulleys.output_radius_m.powi(2);
             sheath.friction_coefficient = 0.35 / sheath.wrap_angle_rad;
@@ -140,6 +137,7 @@ impl Physics {
                 _ => {}
             }
         }
+        model.effects = with_values(&EFFECTS);
         model.effects.retain(|active| {
             self != Self::GainAndViscous
                 && match active.descriptor().id {
@@ -150,23 +148,17 @@ impl Physics {
                 }
         });
         for active in &mut model.effects {
-            *active = match active.descriptor().id {
-                "tendon_slack" => {
-                    active.with("looseness_m", if self == Self::NoLooseness { 0.0 } else { 6e-5 })
-                }
-                "joint_coulomb_friction" | "motor_coulomb_friction" => active.with("torque_nm", 0.02),
-                _ => *active,
-            };
+            if self == Self::NoLooseness && active.descriptor().id == "tendon_slack" {
+                *active = active.with("looseness_m", 0.0);
+            }
         }
         let added = match self {
             Self::GainAndViscous => Some(("motor_viscous_friction", "viscous_nm_s_per_rad", 0.02)),
             Self::WithSpring => Some(("joint_spring", "stiffness_nm_per_rad", 0.007)),
             _ => None,
         };
-        if let Some((id, name, value)) = added
-            && let Some(effect) = find(id)
-        {
-            model.effects.push(ActiveEffect::with_defaults(effect).with(name, value));
+        if let Some((id, name, value)) = added {
+            model.effects.extend(with_values(&[(id, &[(name, value)])]));
         }
     }
 
@@ -222,17 +214,11 @@ pub struct Recordings {
 /// When a file of the data set is missing or unusable.
 pub fn load(data: &Path, load: Load) -> Result<Recordings, Failure> {
     let folder = data.join(FOLDER);
+    let study = RealStudy::load(FOLDER, &folder)?;
     let full: Result<Vec<Run>, Failure> = listed_recordings(&folder)?
         .into_iter()
         .map(|name| {
-            let same = SAME_TOOL.iter().find(|(start, _)| name.starts_with(start)).map(|(_, tool)| *tool);
-            let tool = same.unwrap_or_else(|| name.split("__").next().unwrap_or_default());
-            let group = RIGS.iter().position(|(id, _)| *id == tool).ok_or_else(|| {
-                Failure::bad_input(format!(
-                    "{name}: no rig for its tool, expected T4L_2, T4L_4, T4R_5 or T5L_3"
-                ))
-            })?;
-            let mut rig = RIGS[group].1.parse()?;
+            let (group, mut rig) = study.stated(&name)?;
             if load == Load::Commanded {
                 rig.columns.channels.retain(|(channel, _)| *channel != Channel::TorqueOut);
                 let source =
@@ -364,12 +350,14 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     let (_, fitted, knobs) = in_sample(&runs, Physics::All, Calibration::PerTool)?;
     print(table.to_string());
 
-    let mut table = Table::new(&["fitted to all", "shared", "T4L_2", "T4L_4", "T4R_5", "T5L_3"]);
+    let mut table = Table::new(&[&["fitted to all", "shared"][..], &TOOLS].concat());
+    let mut model = runs.full[0].model.clone();
+    Physics::All.prepare(&mut model);
     for (index, knob) in knobs.iter().enumerate() {
-        let own = knob.spread.map_or(0..0, |_| 0..RIGS.len());
+        let own = knob.spread.map_or(0..0, |_| 0..TOOLS.len());
         let values = [None].into_iter().chain(own.map(Some));
         let values = values.map(|group| format!("{:.4e}", fitted.value(&knobs, index, group)));
-        table.row([knob.free.path(&runs.full[0].model)].into_iter().chain(values));
+        table.row([knob.free.path(&model)].into_iter().chain(values));
     }
     print(table.to_string());
 

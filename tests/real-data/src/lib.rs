@@ -22,6 +22,8 @@ use std::path::Path;
 
 use bowden_core::outcome::Failure;
 use bowden_core::rig::Rig;
+use bowden_model::effect::ActiveEffect;
+use bowden_model::effects::find;
 
 pub use table::Table;
 
@@ -106,6 +108,15 @@ macro_rules! rig_file {
     };
 }
 use rig_file;
+
+/// Effects of the catalogue with some values, and the usual ones of the others.
+fn with_values(effects: &[(&str, &[(&str, f64)])]) -> Vec<ActiveEffect> {
+    let of = |(id, values): &(&str, &[(&str, f64)])| {
+        let usual = ActiveEffect::with_defaults(find(id)?);
+        Some(values.iter().fold(usual, |effect, (name, value)| effect.with(name, *value)))
+    };
+    effects.iter().filter_map(of).collect()
+}
 
 /// The reason for a file of a data set that cannot be used.
 fn unusable(path: &Path, reason: impl fmt::Display) -> Failure {

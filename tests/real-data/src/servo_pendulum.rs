@@ -11,7 +11,7 @@ use bowden_model::channel::Channel;
 
 use super::joint_fit::{Knob, Run, fit, leave_out};
 use super::study::{RealStudy, answers};
-use super::{Mark, RigFile, Table, listed_recordings, mean, rig_file};
+use super::{Mark, Table, listed_recordings, mean, with_values};
 
 /// Folder of the data set.
 pub const FOLDER: &str = "bam-xl330-pendulum";
@@ -22,12 +22,13 @@ pub const LIMIT_RAD: f64 = 0.0399;
 /// Largest mean absolute angle error that the diagnosis may leave on recordings held out, rad: what the reference fit leaves.
 pub const DIAGNOSED_LIMIT_RAD: f64 = 0.0353;
 
-/// Firmware gain and rig; the files differ in name and gain only.
-const RIGS: [(&str, RigFile); 4] = [
-    ("kp100", rig_file!("rigs/xl330-kp100.toml")),
-    ("kp200", rig_file!("rigs/xl330-kp200.toml")),
-    ("kp400", rig_file!("rigs/xl330-kp400.toml")),
-    ("kp800", rig_file!("rigs/xl330-kp800.toml")),
+/// Firmware gains, as the recordings name them.
+const GAINS: [&str; 4] = ["kp100", "kp200", "kp400", "kp800"];
+
+/// Effects that people chose, with the values where fits start.
+const EFFECTS: [(&str, &[(&str, f64)]); 2] = [
+    ("motor_coulomb_friction", &[("torque_nm", 0.02)]),
+    ("gear_load_friction", &[("coefficient", 0.5), ("exponent", 2.0)]),
 ];
 
 /// Angle error that counts as 1 in the fit, rad.
@@ -80,31 +81,26 @@ impl Physics {
         }
     }
 
-    /// Replaces fitted values of the rig by those of the data sheet and round guesses, so that no fit starts from what
-    /// all recordings told, and takes out what this physics lacks.
+    /// Adds the effects of this physics to the rig of the study, at round guesses.
     fn prepare(self, model: &mut JointModel) {
         if let Some(motor) = &mut model.parameters.motor {
-            // Data sheet at 5 V: stall torque 0.52 N·m at 1.47 A.
+            // Data sheet at 5 V, to its last digit: stall torque 0.52 N·m at 1.47 A.
             motor.resistance_ohm = 5.0 / 1.47;
             motor.torque_constant_nm_per_a = 0.52 / 1.47 / motor.gear_ratio;
             motor.rotor_inertia_kg_m2 = if self == Self::NoRotorInertia { 1e-9 } else { 1e-8 };
             motor.viscous_nm_s_per_rad =
                 if matches!(self, Self::Viscous | Self::DryAndViscous) { 0.02 } else { 0.0 };
         }
+        model.effects = with_values(&EFFECTS);
         model.effects.retain(|active| match active.descriptor().id {
             "motor_coulomb_friction" => !matches!(self, Self::Viscous | Self::NoDryFriction),
             "gear_load_friction" => !matches!(self, Self::Viscous | Self::DryAndViscous),
             _ => true,
         });
         for active in &mut model.effects {
-            *active = match active.descriptor().id {
-                "motor_coulomb_friction" => active.with("torque_nm", 0.02),
-                "gear_load_friction" if self == Self::ProportionalGearFriction => {
-                    active.with("coefficient", 0.3).with("exponent", 1.0)
-                }
-                "gear_load_friction" => active.with("coefficient", 0.5),
-                _ => *active,
-            };
+            if self == Self::ProportionalGearFriction && active.descriptor().id == "gear_load_friction" {
+                *active = active.with("coefficient", 0.3).with("exponent", 1.0);
+            }
         }
     }
 
@@ -125,21 +121,25 @@ impl Physics {
     }
 }
 
-/// The recordings, prepared; the joints are as the rigs state them.
+/// The study of the servo.
+fn study(data: &Path) -> Result<RealStudy, Failure> {
+    RealStudy::load("xl330-pendulum", &data.join(FOLDER))
+}
+
+/// The recordings, prepared; the joints are as the study states them.
 ///
 /// # Errors
 /// When a file of the data set is missing or unusable.
 pub fn load(data: &Path) -> Result<Vec<Run>, Failure> {
     let folder = data.join(FOLDER);
+    let study = study(data)?;
     listed_recordings(&folder)?
         .into_iter()
         .map(|name| {
-            let group = RIGS.iter().position(|(gain, _)| name.contains(gain)).ok_or_else(|| {
-                Failure::bad_input(format!(
-                    "{name}: no rig for its gain, expected kp100, kp200, kp400 or kp800"
-                ))
+            let group = GAINS.iter().position(|gain| name.contains(gain)).ok_or_else(|| {
+                Failure::bad_input(format!("{name}: names no gain, expected {}", GAINS.join(" or ")))
             })?;
-            let rig = RIGS[group].1.parse()?;
+            let (_, rig) = study.stated(&name)?;
             Ok(Run::load(&rig, &folder, name, group, &[(Channel::ThetaOut, SCALE_RAD)])?.from_rest())
         })
         .collect()
@@ -258,7 +258,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     }
     print(table.to_string());
 
-    let [servo] = answers(&[RealStudy::load("xl330-pendulum", &data.join(FOLDER))?], &mut print)?;
+    let [servo] = answers(&[study(data)?], &mut print)?;
     Ok(vec![
         Mark {
             quantity: "servo pendulum, mean absolute angle error held out by recording, rad",

@@ -67,7 +67,7 @@ impl RealStudy {
         }
         self.loaded.study.recordings.sort_by_key(|listed| listed.role);
         if self.heldout().next().is_none() {
-            return Err(Failure::bad_input(format!("{}: no recording {heldout}", self.asked)));
+            return Err(self.lacks("recording", heldout));
         }
         self.asked = format!("{}, held out {heldout}", self.asked);
         Ok(self)
@@ -78,10 +78,9 @@ impl RealStudy {
     /// # Errors
     /// When there is no such bench.
     pub fn of_bench(mut self, name: &str) -> Result<Self, Failure> {
+        let index = self.loaded.study.benches.iter().position(|bench| bench.name == name);
+        let index = index.ok_or_else(|| self.lacks("bench", name))?;
         let LoadedStudy { study, documents, .. } = &mut self.loaded;
-        let Some(index) = study.benches.iter().position(|bench| bench.name == name) else {
-            return Err(Failure::bad_input(format!("{}: no bench {name}", self.asked)));
-        };
         study.benches = vec![study.benches.swap_remove(index)];
         *documents = vec![documents.swap_remove(index)];
         study.recordings.retain(|listed| listed.bench == index);
@@ -101,6 +100,21 @@ impl RealStudy {
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
         [self.loaded.study.benches.len(), self.loaded.study.recordings.len()]
+    }
+
+    /// Index of the bench of a recording, and its rig with what is different in the recording.
+    ///
+    /// # Errors
+    /// When there is no such recording.
+    pub fn stated(&self, recording: &str) -> Result<(usize, Rig), Failure> {
+        let study = &self.loaded.study;
+        let listed = study.recordings.iter().find(|listed| name_of(&listed.recording) == recording);
+        let listed = listed.ok_or_else(|| self.lacks("recording", recording))?;
+        Ok((listed.bench, with_what_is_set(&study.benches[listed.bench].rig, listed)?))
+    }
+
+    fn lacks(&self, what: &str, name: &str) -> Failure {
+        Failure::bad_input(format!("{}: no {what} {name}", self.asked))
     }
 
     /// Makes the diagnosis and replays what was held out.
@@ -158,12 +172,16 @@ pub struct Error {
     pub mean_absolute: f64,
 }
 
+/// `rig` with what is different in a recording.
+fn with_what_is_set(rig: &Rig, listed: &StudyRecording) -> Result<Rig, Failure> {
+    let mut rig = rig.clone();
+    listed.set.iter().try_for_each(|assignment| assignment.apply(&mut rig))?;
+    Ok(rig)
+}
+
 /// Errors of every output of `rig` over a recording.
 fn errors(rig: &Rig, listed: &StudyRecording) -> Result<Vec<(Channel, Error)>, Failure> {
-    let mut rig = rig.clone();
-    for assignment in &listed.set {
-        assignment.apply(&mut rig)?;
-    }
+    let rig = with_what_is_set(rig, listed)?;
     let recording = &listed.recording;
     let model = JointModel::from_rig(&rig, recording)?;
     let predicted = predict(&rig, recording)?;

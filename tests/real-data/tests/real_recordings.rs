@@ -203,24 +203,3 @@ fn the_hysteresis_of_a_band_damper_is_predicted_from_its_displacement() {
         assert!((1.85..2.05).contains(&lever.ratio), "{}: {}", shown.name, lever.ratio);
     }
 }
-
-/// The four rigs of one bench differ where the firmware gain does, and the rigs replay what they describe.
-#[test]
-fn the_rigs_of_the_servo_differ_in_name_and_gain_alone() {
-    let rig = |gain: u32| -> Vec<String> {
-        let path: PathBuf =
-            [env!("CARGO_MANIFEST_DIR"), "rigs", &format!("xl330-kp{gain}.toml")].iter().collect();
-        std::fs::read_to_string(path).unwrap().lines().map(str::to_owned).collect()
-    };
-    let first = rig(100);
-    for gain in [200, 400, 800] {
-        let other = rig(gain);
-        assert_eq!(first.len(), other.len());
-        for (a, b) in first.iter().zip(&other).filter(|(a, b)| a != b) {
-            assert!(
-                ["name", "gain_duty_per_rad", "# Dynamixel"].iter().any(|key| a.starts_with(key)),
-                "{a:?} differs from {b:?}"
-            );
-        }
-    }
-}
