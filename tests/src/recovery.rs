@@ -72,7 +72,7 @@ impl Recovery {
             "held-out loss {loss_without:.3} without, {loss_with:.3} with, ratio {:.3}",
             loss_with / loss_without
         );
-        for ((free, value), std) in free.iter().zip(&fitted.values).zip(&fitted.stds) {
+        for ((free, value), std) in free.iter().zip(&fitted.values).zip(&fitted.slopes().stds) {
             println!("  {} {value:.5} ± {:.5}", free.path(&with), std.unwrap_or(f64::NAN));
         }
         Self { effect: fitted.model.effects[0], loss_without, loss_with }

@@ -404,7 +404,7 @@ impl Case<'_> {
         let recalibrated_parameters: Vec<Recalibrated> = nominal
             .iter()
             .zip(&last.values)
-            .zip(&last.stds)
+            .zip(&last.slopes().stds)
             .map(|((free, value), std)| Recalibrated {
                 bench: free.bench(model).map(|bench| self.benches[bench].0.name.clone()),
                 parameter: free.path(model),
@@ -429,19 +429,19 @@ impl Case<'_> {
             if let Some(law) = law::of(&active) {
                 let improvement = improvement([chosen.loss_before, chosen.loss_after]);
                 laws.push((
-                    stated_laws::stated(law, &active, heldout, improvement, &last.stds[values]),
+                    stated_laws::stated(law, &active, heldout, improvement, &last.slopes().stds[values]),
                     active,
                 ));
                 continue;
             }
             if let Some(hypothesis) = hypothesis::of(&active) {
                 let improvement = improvement([chosen.loss_before, chosen.loss_after]);
-                let stds = &last.stds[values];
+                let stds = &last.slopes().stds[values];
                 laws.push((hypotheses::stated(hypothesis, &active, heldout, improvement, stds), active));
                 continue;
             }
             if let Some((_, named)) = effects.iter_mut().find(|(other, _)| other.is_beside(&active)) {
-                named.further.push(estimates(&active, &last.stds[values]));
+                named.further.push(estimates(&active, &last.slopes().stds[values]));
                 continue;
             }
             let separate = |tried: &Tried| {
@@ -450,7 +450,10 @@ impl Case<'_> {
                 experiments.push(found);
                 Some(words)
             };
-            effects.push((active, named(active, chosen, heldout, &last.stds[values], objective, separate)));
+            effects.push((
+                active,
+                named(active, chosen, heldout, &last.slopes().stds[values], objective, separate),
+            ));
         }
         let mut effects: Vec<NamedEffect> =
             effects.into_iter().map(|(active, named)| strongest_first(&active, named)).collect();

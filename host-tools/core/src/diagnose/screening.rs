@@ -109,7 +109,7 @@ pub fn screen(
     progress: &dyn Progress,
 ) -> Vec<Screened> {
     let [objective, _] = &objective.split();
-    let basis = Basis::new(&present.solution.jacobian);
+    let basis = Basis::new(&present.solution.slopes().jacobian);
     let rows_now = rows(objective, &present.solution.residuals);
     let now = basis.without(&rows_now);
     let background = Background { objective, present, basis, loss_now: now.norm_squared(), now, rows_now };

@@ -121,7 +121,7 @@ pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibrati
 
     let parameters = free
         .iter()
-        .zip(solution.values.iter().zip(&solution.stds))
+        .zip(solution.values.iter().zip(&solution.slopes().stds))
         .filter_map(|(free, (value, std))| {
             let fitted = rounded(*value).clamp(free.spec().lower, free.spec().upper);
             Some(FittedParameter {

@@ -1,10 +1,11 @@
 //! Levenberg–Marquardt on the replay residuals.
 
 mod problem;
+mod solution;
 
 use std::sync::Mutex;
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
 
 use super::free::Free;
@@ -12,7 +13,9 @@ use super::objective::{Aspect, Entry, Objective, Part, Residuals, soft};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::{Progress, Quiet, ended_early};
-use problem::Problem;
+use problem::{Problem, Start};
+use solution::End;
+pub use solution::{Slopes, Solution};
 
 /// Step of the difference quotients in the optimiser's coordinate that sees the slope through the roughness that stick,
 /// slip and impacts leave in the residuals.
@@ -23,24 +26,6 @@ pub const FINE_STEP: f64 = 0.02;
 
 /// Longest first step of a round, in the optimiser's coordinate of the parameter that the residuals answer to least.
 const FIRST_STEP: f64 = 0.5;
-
-/// Result of a fit.
-#[derive(Clone, Debug)]
-pub struct Solution {
-    /// Model with the fitted values.
-    pub model: JointModel,
-    /// Fitted values.
-    pub values: Vec<f64>,
-    /// Their standard deviations; `None` for a value at a bound.
-    pub stds: Vec<Option<f64>>,
-    /// Residuals of the fitted model.
-    pub residuals: Residuals,
-    /// Standard deviation of a weighted residual of the fitted model, at least 1: the weight of what is believed.
-    pub spread: f64,
-    /// Slopes of the weighted residuals over the optimiser's coordinates, training rows and priors; empty after a fit that
-    /// only ranks.
-    pub jacobian: DMatrix<f64>,
-}
 
 /// Standard deviation of weighted training residuals, at least 1, what scales say, allowing for how long they stay alike: what two
 /// descriptions of a contact differ by lasts as long as a motion, also where it is small, and tells so much less.
@@ -93,7 +78,10 @@ pub fn solve_watched(
     progress: &dyn Progress,
 ) -> Result<Solution, Failure> {
     let rounds = [COARSE_STEP, FINE_STEP, FINE_STEP];
-    solve_knowing(objective, model, free, patience, &rounds, None, progress)
+    let solution = solve_knowing(objective, model, free, patience, &rounds, None, progress)?;
+    solution.slopes_watched(progress);
+    refuse_interrupted(progress)?;
+    Ok(solution)
 }
 
 /// Like [`solve`] with the given steps of the difference quotients, one round each.
@@ -133,6 +121,46 @@ pub fn solve_for_ranking(
     solve_knowing(objective, model, free, patience, &[COARSE_STEP], Some(known), &Quiet)
 }
 
+/// What a fit moves, and what judges it.
+struct Fit {
+    /// The recordings that are fitted to.
+    objective: Objective,
+    /// Model before the fit.
+    model: JointModel,
+    free: Vec<Free>,
+}
+
+impl Fit {
+    /// What the optimiser sees from a place on, with the residuals there.
+    fn problem<'a>(
+        &'a self,
+        step: f64,
+        fixed: &[bool],
+        (x, current): (DVector<f64>, Option<Residuals>),
+        begun: Option<Start>,
+        prior_weight: f64,
+        progress: &'a dyn Progress,
+    ) -> Problem<'a> {
+        let Self { objective, model, free } = self;
+        let fixed = fixed.to_vec();
+        let stood = Mutex::new(None);
+        Problem {
+            objective,
+            model,
+            free,
+            progress,
+            fixed,
+            step,
+            prior_weight,
+            known: None,
+            x,
+            current,
+            begun,
+            stood,
+        }
+    }
+}
+
 fn solve_knowing(
     objective: &Objective,
     model: &JointModel,
@@ -143,45 +171,27 @@ fn solve_knowing(
     progress: &dyn Progress,
 ) -> Result<Solution, Failure> {
     let slopes = known.and_then(|known| known.jacobian);
-    let [objective, judging] = &objective.split();
+    let [objective, judging] = objective.split();
     // Inside the optimiser an error could not be told.
     let mut start = objective.residuals(model)?;
     if free.is_empty() {
         start.values.extend(judging.residuals(model)?.values);
-        return Ok(Solution {
-            model: model.clone(),
-            values: Vec::new(),
-            stds: Vec::new(),
-            residuals: start,
-            spread: 1.0,
-            jacobian: DMatrix::zeros(0, 0),
-        });
+        return Ok(Solution::with_slopes(model.clone(), Vec::new(), start, Slopes::none(0, 1.0)));
     }
+    let fit = Fit { objective, model: model.clone(), free: free.to_vec() };
     let mut fixed = vec![false; free.len()];
     let prior_weight = known.map_or(1.0, |known| known.spread);
-    let problem_at = |step, fixed: &[bool], x, current, begun| Problem {
-        objective,
-        model,
-        free,
-        progress,
-        fixed: fixed.to_vec(),
-        step,
-        prior_weight,
-        known: slopes,
-        x,
-        current,
-        begun,
-        stood: Mutex::new(None),
-    };
     let mut x = DVector::zeros(free.len());
     // Residuals at `x`: no round simulates again where the one before it ended.
     let mut current = Some(start).filter(Residuals::is_finite);
     // Slopes where the round before ended, if they were simulated there, with the step of their quotients.
-    let mut ended: Option<(f64, _)> = None;
+    let mut ended: Option<(f64, Start)> = None;
     let found_with =
-        |step, ended: Option<(f64, _)>| ended.filter(|(with, _)| *with == step).map(|(_, begun)| begun);
+        |step, ended: Option<(f64, Start)>| ended.filter(|(with, _)| *with == step).map(|(_, begun)| begun);
     for (round, &step) in rounds.iter().enumerate() {
-        let mut problem = problem_at(step, &fixed, x, current, found_with(step, ended));
+        let begun = found_with(step, ended);
+        let mut problem = fit.problem(step, &fixed, (x, current), begun, prior_weight, progress);
+        problem.known = slopes;
         if known.is_none() {
             problem.weigh_priors();
         }
@@ -211,28 +221,21 @@ fn solve_knowing(
             break;
         }
     }
-    let mut problem = problem_at(FINE_STEP, &fixed, x, current, found_with(FINE_STEP, ended));
-    let values: Vec<f64> = free.iter().zip(problem.x.iter()).map(|(free, x)| free.value_at(*x)).collect();
-    let model = problem.model_at(&problem.x);
-    let (jacobian, stds) = if known.is_some() {
-        (DMatrix::zeros(0, 0), vec![None; free.len()])
-    } else {
-        problem.weigh_priors();
-        let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, free.len()));
-        let stds = standard_deviations(&jacobian, &fixed)
-            .into_iter()
-            .zip(free.iter().zip(&values))
-            .map(|(std, (free, value))| std.map(|s| s * problem.prior_weight * free.slope_at(*value)))
-            .collect();
-        (jacobian, stds)
-    };
-    refuse_interrupted(progress)?;
-    let mut residuals = match problem.current {
-        Some(residuals) => residuals,
-        None => objective.residuals(&model)?,
+    let begun = found_with(FINE_STEP, ended);
+    let place = (x.clone(), current.clone());
+    let model = fit.problem(FINE_STEP, &fixed, place, None, prior_weight, progress).model_at(&x);
+    let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
+    let mut residuals = match &current {
+        Some(residuals) => residuals.clone(),
+        None => fit.objective.residuals(&model)?,
     };
     residuals.values.extend(judging.residuals(&model)?.values);
-    Ok(Solution { model, values, stds, residuals, spread: problem.prior_weight, jacobian })
+    if known.is_some() {
+        let none = Slopes::none(values.len(), prior_weight);
+        return Ok(Solution::with_slopes(model, values, residuals, none));
+    }
+    let end = End { fit, fixed, x, current, begun, prior_weight };
+    Ok(Solution::ended(model, values, residuals, end))
 }
 
 /// A solution of which simulations are missing is none.

@@ -90,7 +90,7 @@ impl Search<'_> {
             }
             let model = &fitted.solution.model;
             let newest = model.effects.len() - 1;
-            let all = &fitted.solution.stds;
+            let all = &fitted.solution.slopes().stds;
             let first = all.len() - Layout::of_found(model, newest).len();
             let stds = all[first..][..Free::of_effect(model, newest).len()].to_vec();
             trials.push(Trial {

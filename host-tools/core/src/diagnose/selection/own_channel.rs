@@ -39,7 +39,8 @@ impl Search<'_> {
     /// Mean square, in noise scales, of the change that effect `place` of `with` makes in its own channel and no change of parameters can
     /// make; `None` if the channel drives the replay.
     fn own_change(&self, with: &Fitted, place: usize) -> Result<Option<f64>, Failure> {
-        let Solution { model, residuals, jacobian, .. } = &with.solution;
+        let Solution { model, residuals, .. } = &with.solution;
+        let jacobian = &with.solution.slopes().jacobian;
         let effect = &model.effects[place];
         let [objective, _] = &self.objective.split();
         let is_of_sensor =

@@ -9,32 +9,33 @@ use super::{
 };
 use crate::diagnose::layout::Layout;
 use crate::fit::objective::{Objective, Residuals};
-use crate::fit::solver::Solution;
+use crate::fit::solver::{Slopes, Solution};
 use crate::joint_model::JointModel;
 use crate::progress::Quiet;
 use crate::simulation::{ReplayInput, replay};
 use crate::test_bench;
 
-fn solution(model: JointModel) -> Solution {
-    Solution {
-        model,
-        values: Vec::new(),
-        stds: Vec::new(),
-        residuals: Residuals { values: Vec::new() },
-        spread: 1.0,
-        jacobian: DMatrix::zeros(0, 0),
-    }
+fn solution(model: JointModel, stds: Vec<Option<f64>>) -> Solution {
+    let slopes = Slopes { stds, spread: 1.0, jacobian: DMatrix::zeros(0, 0) };
+    Solution::with_slopes(model, Vec::new(), Residuals { values: Vec::new() }, slopes)
 }
 
 fn fitted((layout, model): (Layout, JointModel)) -> Fitted {
     let stretch_losses = [].into();
-    Fitted { layout, solution: solution(model), loss: 1.0, stretch_losses, finished: true, unseen: false }
+    Fitted {
+        layout,
+        solution: solution(model, Vec::new()),
+        loss: 1.0,
+        stretch_losses,
+        finished: true,
+        unseen: false,
+    }
 }
 
 fn nothing_found(bench: &JointModel) -> Selected {
     let nothing = fitted((Layout::of(bench), bench.clone()));
     Selected {
-        baseline: solution(bench.clone()),
+        baseline: solution(bench.clone(), Vec::new()),
         model: bench.clone(),
         chosen: Vec::new(),
         rounds: Vec::new(),
@@ -77,7 +78,7 @@ fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
         let mut stds = vec![Some(1e9); calibrated];
         stds.extend([Some(excess_std_nm), Some(1e9), Some(1e9)]);
         let model = with(falling(excess_nm, coulomb_nm));
-        selected.without_faded(&objective, &Solution { model, stds, ..nothing_found(&bench).baseline })
+        selected.without_faded(&objective, &solution(model, stds))
     };
     assert!(left_of(0.5, 0.07, 0.3).is_none());
     // The 90 % interval contains zero from a standard deviation of 0.304 on.

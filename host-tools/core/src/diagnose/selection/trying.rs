@@ -151,8 +151,9 @@ impl Search<'_> {
         let (layout, with) = present.layout.with(without, screened.start);
         let free = layout.free(self.believed, &with);
         let gone = present.layout.parameters_missing_in(&layout, self.believed);
-        let slopes = present.solution.jacobian.clone().remove_columns_at(&gone);
-        let known = Known { jacobian: known_slopes.then_some(&slopes), spread: present.solution.spread };
+        let slopes = present.solution.slopes();
+        let jacobian = known_slopes.then(|| slopes.jacobian.clone().remove_columns_at(&gone));
+        let known = Known { jacobian: jacobian.as_ref(), spread: slopes.spread };
         let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
         Ok(self.judged(layout, solution, false))
     }

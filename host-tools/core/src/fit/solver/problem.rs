@@ -47,10 +47,13 @@ pub(super) struct Problem<'a> {
     pub(super) x: DVector<f64>,
     pub(super) current: Option<Residuals>,
     /// Slopes at the place where the round begins.
-    pub(super) begun: Option<(DVector<f64>, DMatrix<f64>)>,
+    pub(super) begun: Option<Start>,
     /// Where the optimiser stood last.
     pub(super) stood: Mutex<Option<Place>>,
 }
+
+/// A place, and the slopes that were simulated there.
+pub(super) type Start = (DVector<f64>, DMatrix<f64>);
 
 /// A place where the optimiser has stood.
 pub(super) struct Place {
@@ -95,7 +98,7 @@ impl Problem<'_> {
     }
 
     /// Where it stands, and the slopes that were found there by simulation, if they were.
-    pub(super) fn simulated_slopes(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    pub(super) fn simulated_slopes(&self) -> Option<Start> {
         let stood = self.stood.lock().unwrap_or_else(PoisonError::into_inner);
         let stood = stood.as_ref().filter(|place| place.steps == 0).map(|place| (&place.x, &place.slopes));
         let begun = self.begun.as_ref().map(|(x, slopes)| (x, slopes));
