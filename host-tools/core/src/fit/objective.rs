@@ -16,6 +16,7 @@
 mod block;
 mod blockwise;
 mod dataset;
+mod memory;
 mod scale;
 
 use std::collections::BTreeMap;
@@ -28,10 +29,9 @@ use crate::fit::observed::{Observed, Use};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::simulation::{Prediction, ReplayInput, replay_into};
+use crate::simulation::{Prediction, ReplayInput};
 pub use block::Block;
 use block::{Moments, moments_of};
-use blockwise::Blockwise;
 use dataset::Dataset;
 pub use scale::{loss, soft};
 use scale::{noise_variance, scale_of};
@@ -329,9 +329,7 @@ impl Objective {
     pub fn residuals(&self, model: &JointModel) -> Result<Residuals, Failure> {
         let mut values = Vec::new();
         for dataset in &self.datasets {
-            let mut seen = Blockwise::new(dataset);
-            replay_into(&dataset.joint(model), &dataset.input, &dataset.outputs, &mut seen)?;
-            self.append(dataset, &seen.simulated, &mut values);
+            self.append(dataset, &dataset.seen(model)?, &mut values);
         }
         Ok(Residuals { values })
     }

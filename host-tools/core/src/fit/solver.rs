@@ -222,11 +222,10 @@ fn solve_knowing(
         }
     }
     let begun = found_with(FINE_STEP, ended);
-    let place = (x.clone(), current.clone());
-    let model = fit.problem(FINE_STEP, &fixed, place, None, prior_weight, progress).model_at(&x);
+    let model = fit.problem(FINE_STEP, &fixed, (x.clone(), None), None, prior_weight, progress).model_at(&x);
     let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
-    let mut residuals = match &current {
-        Some(residuals) => residuals.clone(),
+    let mut residuals = match current {
+        Some(residuals) => residuals,
         None => fit.objective.residuals(&model)?,
     };
     residuals.values.extend(judging.residuals(&model)?.values);
@@ -234,7 +233,7 @@ fn solve_knowing(
         let none = Slopes::none(values.len(), prior_weight);
         return Ok(Solution::with_slopes(model, values, residuals, none));
     }
-    let end = End { fit, fixed, x, current, begun, prior_weight };
+    let end = End { fit, fixed, x, begun, prior_weight };
     Ok(Solution::ended(model, values, residuals, end))
 }
 

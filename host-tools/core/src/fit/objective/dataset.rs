@@ -7,12 +7,14 @@ use std::sync::Arc;
 use bowden_model::channel::Channel;
 
 use super::block::{Block, Moments, moments_of};
+use super::blockwise::Blockwise;
+use super::memory::{Memory, Seen};
 use super::{Part, Series};
 use crate::fit::variation::Variation;
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::simulation::{Prediction, ReplayInput, replay_of};
+use crate::simulation::{Prediction, ReplayInput, replay_into, replay_of};
 
 /// Length of a block of means, s.
 const BLOCK_S: f64 = 0.05;
@@ -47,6 +49,7 @@ pub(super) struct Dataset {
     pub(super) flutter: Vec<Range<usize>>,
     /// Tensions that stood at the lower end of their amplifier.
     pub(super) cut_at_zero: Vec<Channel>,
+    memory: Memory,
 }
 
 impl Dataset {
@@ -72,6 +75,19 @@ impl Dataset {
     pub(super) fn runs_through(&self, time_s: f64) -> bool {
         let [start_s, end_s] = self.input.clock_s();
         (start_s..end_s).contains(&time_s)
+    }
+
+    /// Moments of what the sensors of this recording would have shown of `model`, in every series of `measured`.
+    pub(super) fn seen(&self, model: &JointModel) -> Result<Arc<Seen>, Failure> {
+        let joint = self.joint(model);
+        if let Some(seen) = self.memory.recall(&joint) {
+            return Ok(seen);
+        }
+        let mut seen = Blockwise::new(self);
+        replay_into(&joint, &self.input, &self.outputs, &mut seen)?;
+        let seen = Arc::new(seen.simulated);
+        self.memory.keep(joint.into_owned(), &seen);
+        Ok(seen)
     }
 
     /// What the sensors of this recording would have shown of `model`.
@@ -165,7 +181,18 @@ impl Dataset {
             .filter(|channel| recording.channel(*channel).is_some_and(stood_at_zero))
             .collect();
         let free_offsets = model.free_offsets.clone();
-        Ok(Self { variation, free_offsets, input, outputs, measured, moments, blocks, flutter, cut_at_zero })
+        Ok(Self {
+            variation,
+            free_offsets,
+            input,
+            outputs,
+            measured,
+            moments,
+            blocks,
+            flutter,
+            cut_at_zero,
+            memory: Memory::default(),
+        })
     }
 }
 

@@ -120,3 +120,24 @@ fn what_follows_a_gap_is_not_compared() {
     assert_eq!(holes.collect::<Vec<_>>(), [[(1450, 1500), (1800, 1850)]]);
     assert_eq!(objective.residuals(&model).unwrap().values.len(), objective.entries().count());
 }
+
+/// Residuals that are recalled are those of a simulation, bit for bit, and belong to the joint that was asked for.
+#[test]
+fn what_was_simulated_lately_is_recalled_bit_for_bit() {
+    let mut recording = test_bench::swung(2000);
+    recording.set(Channel::F1, vec![30.0; 2000]);
+    let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+    let with_effect = |strength: f64| {
+        let mut effect = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap());
+        effect.parameters[0] = strength;
+        JointModel { effects: vec![effect], ..model.clone() }
+    };
+    let joints = [model.clone(), with_effect(0.05), with_effect(0.06)];
+    let objective = || Objective::new(&model, std::slice::from_ref(&recording), &[], true).unwrap();
+    let simulated = joints.each_ref().map(|joint| objective().residuals(joint).unwrap());
+    assert!(simulated[0] != simulated[1] && simulated[1] != simulated[2]);
+    let asked_twice = objective();
+    for _ in 0..2 {
+        assert_eq!(joints.each_ref().map(|joint| asked_twice.residuals(joint).unwrap()), simulated);
+    }
+}

@@ -50,18 +50,17 @@ pub(super) struct End {
     pub(super) fit: Fit,
     pub(super) fixed: Vec<bool>,
     pub(super) x: DVector<f64>,
-    /// Residuals at `x`, if they are finite.
-    pub(super) current: Option<Residuals>,
     /// Slopes at `x`, where the fit simulated them already.
     pub(super) begun: Option<Start>,
     pub(super) prior_weight: f64,
 }
 
 impl End {
-    /// Simulates the slopes.
-    fn slopes(&self, progress: &dyn Progress) -> Slopes {
-        let Self { fit, fixed, x, current, begun, prior_weight } = self;
-        let at = (x.clone(), current.clone());
+    /// Simulates the slopes; `residuals` are those at `x`, of what was fitted first.
+    fn slopes(&self, residuals: &Residuals, progress: &dyn Progress) -> Slopes {
+        let Self { fit, fixed, x, begun, prior_weight } = self;
+        let values = residuals.values.iter().copied().take(fit.objective.entries().count()).collect();
+        let at = (x.clone(), Some(Residuals { values }).filter(Residuals::is_finite));
         let mut problem = fit.problem(super::FINE_STEP, fixed, at, begun.clone(), *prior_weight, progress);
         problem.weigh_priors();
         let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, fit.free.len()));
@@ -100,7 +99,7 @@ impl Solution {
     /// The same; empty after a request to end early.
     pub(super) fn slopes_watched(&self, progress: &dyn Progress) -> &Slopes {
         self.slopes.get_or_init(|| match &self.end {
-            Some(end) => end.slopes(progress),
+            Some(end) => end.slopes(&self.residuals, progress),
             None => Slopes::none(self.values.len(), 1.0),
         })
     }
