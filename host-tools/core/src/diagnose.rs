@@ -401,10 +401,11 @@ impl Case<'_> {
         let Self { rig, objective, judge, model, .. } = *self;
         let (training, heldout) = (&self.training, &self.heldout);
         let nominal = Layout::of(model).calibrated(model);
+        let stds = &last.slopes().stds;
         let recalibrated_parameters: Vec<Recalibrated> = nominal
             .iter()
             .zip(&last.values)
-            .zip(&last.slopes().stds)
+            .zip(stds)
             .map(|((free, value), std)| Recalibrated {
                 bench: free.bench(model).map(|bench| self.benches[bench].0.name.clone()),
                 parameter: free.path(model),
@@ -428,20 +429,19 @@ impl Case<'_> {
             let heldout = self.heldout_losses(chosen)?;
             if let Some(law) = law::of(&active) {
                 let improvement = improvement([chosen.loss_before, chosen.loss_after]);
-                laws.push((
-                    stated_laws::stated(law, &active, heldout, improvement, &last.slopes().stds[values]),
-                    active,
-                ));
+                laws.push((stated_laws::stated(law, &active, heldout, improvement, &stds[values]), active));
                 continue;
             }
             if let Some(hypothesis) = hypothesis::of(&active) {
                 let improvement = improvement([chosen.loss_before, chosen.loss_after]);
-                let stds = &last.slopes().stds[values];
-                laws.push((hypotheses::stated(hypothesis, &active, heldout, improvement, stds), active));
+                laws.push((
+                    hypotheses::stated(hypothesis, &active, heldout, improvement, &stds[values]),
+                    active,
+                ));
                 continue;
             }
             if let Some((_, named)) = effects.iter_mut().find(|(other, _)| other.is_beside(&active)) {
-                named.further.push(estimates(&active, &last.slopes().stds[values]));
+                named.further.push(estimates(&active, &stds[values]));
                 continue;
             }
             let separate = |tried: &Tried| {
@@ -450,10 +450,7 @@ impl Case<'_> {
                 experiments.push(found);
                 Some(words)
             };
-            effects.push((
-                active,
-                named(active, chosen, heldout, &last.slopes().stds[values], objective, separate),
-            ));
+            effects.push((active, named(active, chosen, heldout, &stds[values], objective, separate)));
         }
         let mut effects: Vec<NamedEffect> =
             effects.into_iter().map(|(active, named)| strongest_first(&active, named)).collect();

@@ -190,12 +190,8 @@ impl Selected {
             let place = layout.first_found() + index;
             let effect = &fitted.model.effects[place];
             let remainder = remainder(believed, effect);
-            let std = fitted
-                .slopes()
-                .stds
-                .get(layout.values_of_found(&fitted.model, index).start)
-                .copied()
-                .flatten();
+            let first = layout.values_of_found(&fitted.model, index).start;
+            let std = fitted.slopes().stds.get(first).copied().flatten();
             let may_be_zero = std.is_some_and(|std| POLICY.may_be_zero(effect.parameters[0], std));
             let only_the_remainder = may_be_zero && remainder.is_some();
             if !negligible(objective, believed, effect) && !only_the_remainder {

@@ -121,7 +121,7 @@ pub fn solve_for_ranking(
     solve_knowing(objective, model, free, patience, &[COARSE_STEP], Some(known), &Quiet)
 }
 
-/// What a fit moves, and what judges it.
+/// What a fit moves, and what it is fitted to.
 struct Fit {
     /// The recordings that are fitted to.
     objective: Objective,
@@ -131,33 +131,13 @@ struct Fit {
 }
 
 impl Fit {
-    /// What the optimiser sees from a place on, with the residuals there.
-    fn problem<'a>(
-        &'a self,
-        step: f64,
-        fixed: &[bool],
-        (x, current): (DVector<f64>, Option<Residuals>),
-        begun: Option<Start>,
-        prior_weight: f64,
-        progress: &'a dyn Progress,
-    ) -> Problem<'a> {
-        let Self { objective, model, free } = self;
-        let fixed = fixed.to_vec();
-        let stood = Mutex::new(None);
-        Problem {
-            objective,
-            model,
-            free,
-            progress,
-            fixed,
-            step,
-            prior_weight,
-            known: None,
-            x,
-            current,
-            begun,
-            stood,
+    /// The model at a place of the optimiser.
+    fn model_at(&self, x: &DVector<f64>) -> JointModel {
+        let mut model = self.model.clone();
+        for (free, x) in self.free.iter().zip(x.iter()) {
+            free.apply(*x, &mut model);
         }
+        model
     }
 }
 
@@ -190,8 +170,18 @@ fn solve_knowing(
         |step, ended: Option<(f64, Start)>| ended.filter(|(with, _)| *with == step).map(|(_, begun)| begun);
     for (round, &step) in rounds.iter().enumerate() {
         let begun = found_with(step, ended);
-        let mut problem = fit.problem(step, &fixed, (x, current), begun, prior_weight, progress);
-        problem.known = slopes;
+        let mut problem = Problem {
+            fit: &fit,
+            progress,
+            fixed: fixed.clone(),
+            step,
+            prior_weight,
+            known: slopes,
+            x,
+            current,
+            begun,
+            stood: Mutex::default(),
+        };
         if known.is_none() {
             problem.weigh_priors();
         }
@@ -222,7 +212,7 @@ fn solve_knowing(
         }
     }
     let begun = found_with(FINE_STEP, ended);
-    let model = fit.problem(FINE_STEP, &fixed, (x.clone(), None), None, prior_weight, progress).model_at(&x);
+    let model = fit.model_at(&x);
     let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
     let mut residuals = match current {
         Some(residuals) => residuals,

@@ -7,7 +7,7 @@ use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
 use crate::diagnose::onset::{between_recordings, moment_of};
 use crate::diagnose::screening::{Present, Screened, screen};
-use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
+use crate::fit::solver::{FINE_STEP, Known, Slopes, solve_for_ranking};
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
 
@@ -115,13 +115,16 @@ impl Search<'_> {
     /// Coarse fits, sufficient for ranking, of `present` with each of the candidates, and their indices.
     fn fit_promising(&self, present: &Fitted, ranked: &[Screened]) -> Result<Vec<(usize, Fitted)>, Failure> {
         let progress = self.progress;
+        // Before the threads ask for them.
+        let slopes = present.solution.slopes();
         // A single fit leaves threads idle between its sensitivity passes.
         let fits: Result<Vec<Option<(usize, Fitted)>>, Failure> = ranked
             .par_iter()
             .enumerate()
             .map(|(place, screened)| {
-                let fitted =
-                    (!progress.interrupted()).then(|| self.fit_new(present, screened, true)).transpose();
+                let fitted = (!progress.interrupted())
+                    .then(|| self.fit_new(present, slopes, screened, true))
+                    .transpose();
                 progress.advance(1);
                 Ok(fitted?.map(|fitted| (place, fitted)))
             })
@@ -135,7 +138,7 @@ impl Search<'_> {
             let screened = &ranked[*place];
             let astray = fitted.loss > (1.0 - KEPT_PROMISE * screened.gain) * before;
             if astray && (1.0 - screened.gain) * before < best && !progress.interrupted() {
-                let own = self.fit_new(present, screened, false)?;
+                let own = self.fit_new(present, slopes, screened, false)?;
                 if own.loss < fitted.loss {
                     *fitted = own;
                 }
@@ -145,13 +148,18 @@ impl Search<'_> {
         Ok(fits)
     }
 
-    /// Coarse fit of `present` with one more effect, with the sensitivities of `present` or its own.
-    fn fit_new(&self, present: &Fitted, screened: &Screened, known_slopes: bool) -> Result<Fitted, Failure> {
+    /// Coarse fit of `present` with one more effect, with the sensitivities of `present`, in `slopes`, or its own.
+    fn fit_new(
+        &self,
+        present: &Fitted,
+        slopes: &Slopes,
+        screened: &Screened,
+        known_slopes: bool,
+    ) -> Result<Fitted, Failure> {
         let without = screened.room.as_ref().unwrap_or(&present.solution.model);
         let (layout, with) = present.layout.with(without, screened.start);
         let free = layout.free(self.believed, &with);
         let gone = present.layout.parameters_missing_in(&layout, self.believed);
-        let slopes = present.solution.slopes();
         let jacobian = known_slopes.then(|| slopes.jacobian.clone().remove_columns_at(&gone));
         let known = Known { jacobian: jacobian.as_ref(), spread: slopes.spread };
         let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;

@@ -49,6 +49,7 @@ pub(super) struct Dataset {
     pub(super) flutter: Vec<Range<usize>>,
     /// Tensions that stood at the lower end of their amplifier.
     pub(super) cut_at_zero: Vec<Channel>,
+    /// Of these inputs, outputs and blocks, of which only the use may change after the first replay.
     memory: Memory,
 }
 

@@ -1,5 +1,5 @@
 //! Replays that were simulated lately. A search asks for the same joint again and again: a candidate is judged, given room and fitted from
-//! one start, and the laws of a component are screened where the names were. About one replay in ten is such a repetition.
+//! one start, and the laws of a component are screened where the names were.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -17,10 +17,9 @@ use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-use super::{COARSE_STEP, left_over, spread, training_rows};
+use super::{COARSE_STEP, Fit, left_over, spread, training_rows};
 use crate::fit::free::Free;
-use crate::fit::objective::{Objective, Residuals};
-use crate::joint_model::JointModel;
+use crate::fit::objective::Residuals;
 use crate::progress::Progress;
 
 /// Part of the promised fall of the squared residuals that a step has to keep for its slopes to be carried on.
@@ -32,9 +31,7 @@ const CARRIED_ON: [usize; 2] = [10, 1];
 
 /// A fit as the optimiser sees it.
 pub(super) struct Problem<'a> {
-    pub(super) objective: &'a Objective,
-    pub(super) model: &'a JointModel,
-    pub(super) free: &'a [Free],
+    pub(super) fit: &'a Fit,
     /// After a request to end early there are no residuals any more, which ends the optimiser.
     pub(super) progress: &'a dyn Progress,
     pub(super) fixed: Vec<bool>,
@@ -90,10 +87,10 @@ impl Problem<'_> {
     pub(super) fn weigh_priors(&mut self) {
         let slopes = self.simulated_slopes().map(|(_, slopes)| slopes).or_else(|| self.slopes());
         let (Some(slopes), Some(current)) = (slopes, &self.current) else { return };
-        let rows = DVector::from_vec(training_rows(self.objective, current));
+        let rows = DVector::from_vec(training_rows(&self.fit.objective, current));
         let data = slopes.rows(0, rows.len()).into_owned();
         let left = left_over(&data, rows);
-        self.prior_weight = spread(self.objective, left.as_slice(), self.free.len());
+        self.prior_weight = spread(&self.fit.objective, left.as_slice(), self.fit.free.len());
         self.begun = Some((self.x.clone(), slopes));
     }
 
@@ -108,40 +105,32 @@ impl Problem<'_> {
 
     /// `slopes` with the rows of the priors as they are weighed now.
     fn with_priors(&self, mut slopes: DMatrix<f64>) -> DMatrix<f64> {
-        let first = slopes.nrows() - self.free.len();
-        for (j, free) in self.free.iter().enumerate().filter(|(j, _)| !self.fixed[*j]) {
+        let first = slopes.nrows() - self.fit.free.len();
+        for (j, free) in self.fit.free.iter().enumerate().filter(|(j, _)| !self.fixed[*j]) {
             slopes[(first + j, j)] = self.prior_weight * free.prior_slope();
         }
         slopes
-    }
-
-    pub(super) fn model_at(&self, x: &DVector<f64>) -> JointModel {
-        let mut model = self.model.clone();
-        for (free, x) in self.free.iter().zip(x.iter()) {
-            free.apply(*x, &mut model);
-        }
-        model
     }
 
     fn residuals_at(&self, x: &DVector<f64>) -> Option<Residuals> {
         if self.progress.interrupted() {
             return None;
         }
-        self.objective.residuals(&self.model_at(x)).ok().filter(Residuals::is_finite)
+        self.fit.objective.residuals(&self.fit.model_at(x)).ok().filter(Residuals::is_finite)
     }
 
     /// Column `j` of `known`, whose rows end with the priors of its own parameters.
     fn known_column(&self, known: &DMatrix<f64>, j: usize, rows: usize) -> DVector<f64> {
-        let data = rows - self.free.len();
+        let data = rows - self.fit.free.len();
         let mut column = known.column(j).rows(0, data).into_owned().resize_vertically(rows, 0.0);
-        column[data + j] = self.prior_weight * self.free[j].prior_slope();
+        column[data + j] = self.prior_weight * self.fit.free[j].prior_slope();
         column
     }
 
     /// Weighted training residuals followed by the priors.
     fn weighted(&self, residuals: &Residuals, x: &DVector<f64>) -> DVector<f64> {
-        let mut rows = training_rows(self.objective, residuals);
-        let priors = self.free.iter().zip(x.iter());
+        let mut rows = training_rows(&self.fit.objective, residuals);
+        let priors = self.fit.free.iter().zip(x.iter());
         rows.extend(priors.map(|(free, x)| self.prior_weight * free.prior_residual(*x)));
         DVector::from_vec(rows)
     }
@@ -187,7 +176,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 impl Problem<'_> {
     /// Steps over which slopes are carried on at most.
     fn most_steps(&self) -> usize {
-        if self.free.iter().any(Free::is_moment) {
+        if self.fit.free.iter().any(Free::is_moment) {
             return 0;
         }
         CARRIED_ON[usize::from(self.step < COARSE_STEP)]
@@ -219,13 +208,13 @@ impl Problem<'_> {
     /// Slopes of the weighted residuals.
     pub(super) fn slopes(&self) -> Option<DMatrix<f64>> {
         let here = self.weighted(self.current.as_ref()?, &self.x);
-        let columns: Option<Vec<DVector<f64>>> = (0..self.free.len())
+        let columns: Option<Vec<DVector<f64>>> = (0..self.fit.free.len())
             .into_par_iter()
             .map(|j| {
                 if self.fixed[j] {
                     return Some(DVector::zeros(here.len()));
                 }
-                let free = &self.free[j];
+                let free = &self.fit.free[j];
                 if let Some(known) = self.known.filter(|known| j < known.ncols()) {
                     return Some(self.known_column(known, j, here.len()));
                 }
