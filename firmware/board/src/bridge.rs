@@ -5,6 +5,9 @@
 //! and no software needed, and only the next start puts them back. The same do a clock that fails, a core that locks up, a supply
 //! that falls and flash or RAM that is damaged, and a debugger that holds the core.
 //!
+//! A gate driver such as the DRV8305 holds its line low for a fault and toggles it for a warning. Either stops the motor. Behind such a stop
+//! the driver stays awake for a millisecond, and a line that rises by itself meanwhile was a warning, or a disturbance of the line.
+//!
 //! What decides over the outputs is locked until the next reset. The lock can be written with the first write to BDTR only, which
 //! the HAL's driver makes, so the timer is set up here and the HAL does the pins.
 
@@ -13,7 +16,7 @@ use core::mem::forget;
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::pac;
-use embassy_stm32::pac::gpio::vals::Moder;
+use embassy_stm32::pac::gpio::vals::{Idr, Moder};
 use embassy_stm32::pac::timer::vals::{Bkp, Cms, FilterValue, Lock, Mms2, Ocm, Ossi, Ossr};
 use embassy_stm32::peripherals::{PA8, PA9, PB12, PB13, PB14, PC6, TIM1};
 use embassy_stm32::rcc;
@@ -43,11 +46,19 @@ const BREAK_FILTER: FilterValue = FilterValue::FDTS_DIV8_N8;
 /// Level of the voltage detector: 2.9 V where 3.3 V should be (RM0440, `PWR_CR2`).
 const SUPPLY_LEVEL: u8 = 6;
 
+/// Time behind a stop in which the fault line is watched: 1 ms, far above the 56 us for which a DRV8305 pulls it low to warn.
+const LISTENED_CYCLES: u32 = 170_000;
+
+/// Core cycles a millisecond.
+const CYCLES_A_MS: f32 = 170_000.0;
+
 /// The bridge, off after [`Self::new`].
 pub struct Bridge {
     enable: Output<'static>,
     awake: bool,
     on: bool,
+    /// Cycles for which the fault line has been watched behind a stop, while it is.
+    listened: Option<u32>,
 }
 
 impl Bridge {
@@ -98,7 +109,7 @@ impl Bridge {
         forget((High::<Ch1>::new(leg_a.0, kind), Low::<Ch1>::new(leg_a.1, kind)));
         forget((High::<Ch2>::new(leg_b.0, kind), Low::<Ch2>::new(leg_b.1, kind)));
         restart(divider);
-        Self { enable, awake: false, on: false }
+        Self { enable, awake: false, on: false, listened: None }
     }
 
     /// Whether the bridge reports a fault, or has since it was switched on.
@@ -112,6 +123,22 @@ impl Bridge {
     pub fn supply_is_low() -> bool {
         pac::PWR.sr2().read().pvdo()
     }
+
+    /// Watches the fault line, with the gate driver awake, behind a stop that it caused.
+    pub const fn listen(&mut self) {
+        self.listened = Some(0);
+    }
+
+    /// To be asked in each tick: time since the stop \[ms\], once, if the gate driver has let go of its fault line meanwhile.
+    pub fn let_go_ms(&mut self) -> Option<f32> {
+        let listened = self.listened? + self.period_cycles();
+        let is_high = pac::GPIOB.idr().read().idr(12) == Idr::HIGH;
+        self.listened = if is_high || listened >= LISTENED_CYCLES { None } else { Some(listened) };
+        is_high.then(|| listened as f32 * (1.0 / CYCLES_A_MS))
+    }
+
+    /// Longest time between the two \[ms\].
+    pub const LISTENED_MS: f32 = LISTENED_CYCLES as f32 / CYCLES_A_MS;
 
     /// Duty of the coming PWM period, gate driver awake or not, and bridge on or off; off acts at once.
     pub fn set(&mut self, duty_raw: i16, awake: bool, on: bool) {
@@ -129,7 +156,7 @@ impl Bridge {
             self.on = on;
             pac::TIM1.bdtr().modify(|protection| protection.set_moe(on));
         }
-        if awake != self.awake {
+        if awake != self.awake && self.listened.is_none() {
             self.awake = awake;
             self.enable.set_level(awake.into());
         }

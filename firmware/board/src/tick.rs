@@ -73,6 +73,8 @@ struct Orders<'t> {
     ends: &'t mut TickEnds,
     late_permille: Option<u32>,
     supply_low: bool,
+    /// Time since a stop by the fault line until the gate driver let go of it, ms.
+    let_go_ms: Option<f32>,
     /// The one that was taken up.
     order: Order,
     /// The point that was taken out.
@@ -84,6 +86,10 @@ impl Inbox for Orders<'_> {
         if core::mem::take(&mut self.supply_low) {
             self.order = Order::Stop;
             return Some(act(&Command::Trip(Fault::ProcessorSupply, 0, 1.0, 0.0)));
+        }
+        if let Some(let_go_ms) = self.let_go_ms.take() {
+            self.order = Order::Stop;
+            return Some(act(&Command::Trip(Fault::DriverWarning, 0, let_go_ms, Bridge::LISTENED_MS)));
         }
         if let Some(permille) = self.late_permille.take() {
             self.order = Order::Stop;
@@ -127,16 +133,26 @@ impl Tick {
         let input = TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault };
         let number = self.controller.tick_count();
         let late_permille = self.late_permille.take();
-        let mut orders =
-            Orders { ends: &mut self.ends, late_permille, supply_low, order: Order::None, point_raw: None };
+        let mut orders = Orders {
+            ends: &mut self.ends,
+            late_permille,
+            supply_low,
+            let_go_ms: self.bridge.let_go_ms(),
+            order: Order::None,
+            point_raw: None,
+        };
         let output = self.controller.tick(&input, &mut orders);
         let (order, point_raw) = (orders.order, orders.point_raw);
+        if output.tripped.is_some_and(|record| record.fault == Fault::BridgeFault) {
+            self.bridge.listen();
+        }
         self.bridge.set(output.duty_raw, output.driver_on, output.bridge_on);
         let ring = &retained::memory().snapshot;
         ring.push(number, &output.sample);
         if let Some(record) = output.tripped {
             ring.freeze();
-            // There is room: a second fault needs an order of the host, which empties the queue.
+            // There is room for two: a warning of the gate driver comes behind its fault. More need an order of the host, which
+            // empties the queue.
             let _ = self.ends.faults.enqueue(record);
             // Nobody empties it while raw telemetry is off; then nobody asks either.
             let _ = self.ends.told_faults.enqueue(record);

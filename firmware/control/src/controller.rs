@@ -6,6 +6,7 @@
 use bowden_link::message::Mode;
 use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
 
+use crate::channel_order::ChannelOrder;
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
 use crate::correction::lead::{Lead, Led};
 use crate::correction::ripple_table::RippleTable;
@@ -23,7 +24,8 @@ use crate::reference::{Origin, ReferenceConfig, ReferenceState};
 use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
 use crate::sheath::{Fitted, SheathEstimate, SheathInput, SheathObserver};
 use crate::supervisor::{Situation, Supervisor};
-use crate::supply::Supply;
+use crate::supply::{Supply, SupplyReading};
+use crate::surplus_current::SurplusCurrent;
 use crate::tension::TensionChannels;
 use crate::tick::{Command, Inbox, TickConfig, TickInput, TickOutput};
 
@@ -36,6 +38,8 @@ pub struct Controller {
     stuck: StuckWatch,
     motion: MotionWatch,
     circuit: MotorCircuit,
+    surplus: SurplusCurrent,
+    order: ChannelOrder,
     tensions: TensionChannels,
     supply: Supply,
     observer: Observer,
@@ -91,6 +95,8 @@ impl Controller {
             stuck: StuckWatch::default(),
             motion: MotionWatch::default(),
             circuit: MotorCircuit::default(),
+            surplus: SurplusCurrent::default(),
+            order: ChannelOrder::default(),
             tensions: TensionChannels::default(),
             supply: Supply::default(),
             observer: Observer::default(),
@@ -133,12 +139,15 @@ impl Controller {
             let action = self.drive(&readings, inbox, &mut limits);
             if self.motion.samples_now() {
                 self.circuit.sample(readings.current, action.duty_raw);
+                self.surplus.drive(action.duty_raw);
             }
             action
         } else {
             self.stuck.reset();
             self.motion.reset();
             self.circuit.reset();
+            self.surplus.reset();
+            self.order.reset();
             self.starts = false;
             // A joint that rests expects no friction.
             self.loops = Loops::default();
@@ -220,6 +229,8 @@ impl Controller {
         self.stuck = StuckWatch::default();
         self.motion = MotionWatch::default();
         self.circuit = MotorCircuit::default();
+        self.surplus = SurplusCurrent::default();
+        self.order = ChannelOrder::default();
         self.tensions = TensionChannels::default();
         self.supply = Supply::default();
         self.observer = Observer::default();
@@ -303,7 +314,7 @@ impl Controller {
                 .or(supply.found)
                 .or(encoder)
                 .or(tension)
-                .or_else(|| self.watch_motion(input, counts, theta, &tensions, supply.bus_filtered))
+                .or_else(|| self.watch_motion(input, counts, theta, lag, motion, &tensions, &supply))
         } else {
             None
         };
@@ -317,8 +328,10 @@ impl Controller {
         input: &TickInput,
         counts: [i32; 2],
         theta: [Angle; 2],
+        lag: Angle,
+        motion: Motion,
         tensions: &[Tension; 4],
-        bus: Voltage,
+        supply: &SupplyReading,
     ) -> Option<Detection> {
         if !self.supervisor.state().drives() {
             return None;
@@ -329,8 +342,23 @@ impl Controller {
             return Some(Detection { fault: bowden_link::Fault::EncoderStuck, channel, got, limit });
         }
         match self.motion.turn(&self.config.motion)? {
+            Turn::Surplus => {
+                let (current, bus) = (supply.current, supply.bus_filtered);
+                self.surplus.look(
+                    &self.config.surplus,
+                    &self.config.circuit,
+                    current,
+                    motion.speed,
+                    bus,
+                    self.config.rate_hz,
+                )
+            }
+            Turn::Order => {
+                let config = &self.config.tension;
+                self.tensions.filtered().and_then(|ends| self.order.look(config, ends, lag))
+            }
             Turn::Voltage => {
-                self.circuit.voltage(&self.config.circuit, theta[0], bus);
+                self.circuit.voltage(&self.config.circuit, theta[0], supply.bus_filtered);
                 None
             }
             Turn::Current => self.circuit.current(&self.config.circuit),
@@ -338,9 +366,13 @@ impl Controller {
                 let follows =
                     self.supervisor.state() == State::Run && self.supervisor.mode() == Mode::Position;
                 let reference = follows.then(|| Angle::from_bits(self.reference.value_bits()));
+                self.motion.remember(&input.tension_raw);
                 self.motion.joint(&self.config.motion, theta[1], reference)
             }
-            Turn::Tension(n) => self.motion.tension(&self.config.motion, n, &input.tension_raw, tensions),
+            Turn::Tension(n) => {
+                let (config, variance_raw) = (&self.config.motion, &self.config.supervisor.noise_limit);
+                self.motion.tension(config, n, &input.tension_raw, tensions, variance_raw)
+            }
         }
     }
 

@@ -24,6 +24,7 @@
 #[cfg(feature = "alloc")]
 extern crate alloc;
 
+pub mod channel_order;
 pub mod compensator;
 pub mod conformance;
 pub mod controller;
@@ -43,6 +44,7 @@ pub mod sheath;
 pub mod snapshot;
 pub mod supervisor;
 pub mod supply;
+pub mod surplus_current;
 pub mod tension;
 pub mod tick;
 pub mod winding;

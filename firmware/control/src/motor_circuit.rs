@@ -55,7 +55,7 @@ use crate::scale::{Angle, Current, Gain, Quantity, Ratio, Share, Voltage};
 /// Largest resistance, with its margin for the way to a steady state, over the one of the parameters.
 pub const RESISTANCE_FACTOR: f32 = 1.25 * 2.0;
 /// Part of the back-EMF by which it may be off.
-const BACK_EMF_TOLERANCE: Ratio = Ratio::from_parts(1, 4);
+pub(crate) const BACK_EMF_TOLERANCE: Ratio = Ratio::from_parts(1, 4);
 /// Looks in a row.
 const LOOKS: i8 = 3;
 /// Bits of a current that the sum over a look leaves out, so that it fits: 0.24 mA are left.
@@ -177,17 +177,14 @@ impl MotorCircuit {
     /// First half of the look behind the last sample: the voltage.
     #[inline(never)]
     pub fn voltage(&mut self, config: &CircuitConfig, theta_in: Angle, bus: Voltage) {
-        let duty_raw = mean(config, core::mem::take(&mut self.duty_sum_raw));
+        let duty_raw = mean(config, core::mem::take(&mut self.duty_sum_raw)) as i16;
         let Some(before) = self.theta_in.replace(theta_in) else {
             // Where the bridge went on.
             self.known = Voltage::ZERO;
             return;
         };
         let back_emf = config.back_emf.apply(theta_in.minus(before));
-        let duty_raw = if config.reversed { -duty_raw } else { duty_raw };
-        // A duty of 1 is 32767, here 32768: 3e-5 too little.
-        let voltage = Voltage::from_bits(((i64::from(duty_raw) * i64::from(bus.to_bits())) >> 15) as i32);
-        let across = voltage.minus(back_emf);
+        let across = voltage_of(duty_raw, config.reversed, bus).minus(back_emf);
         let unknown = config.unknown(back_emf, bus);
         self.known = across.minus(across.limited(unknown));
     }
@@ -207,6 +204,13 @@ impl MotorCircuit {
         };
         if self.looks.saturating_abs() < LOOKS { None } else { Some(named(current, least)) }
     }
+}
+
+/// Voltage of the bridge towards +θ. A duty of 1 is 32767, here 32768: 3e-5 too little.
+#[inline]
+pub(crate) fn voltage_of(duty_raw: i16, reversed: bool, bus: Voltage) -> Voltage {
+    let duty_raw = if reversed { -i64::from(duty_raw) } else { i64::from(duty_raw) };
+    Voltage::from_bits(((duty_raw * i64::from(bus.to_bits())) >> 15) as i32)
 }
 
 /// Mean of the samples of a look, rounded down.

@@ -9,8 +9,8 @@
 //! | fault | off | self test | pretension check | ready | homing | run |
 //! |---|---|---|---|---|---|---|
 //! | encoder frames, jumps | | x | x | x | x | x |
-//! | encoder stuck, tension stuck, joint speed | | | | | x | x |
-//! | open motor lead | | | | | x | x |
+//! | encoder stuck, tension stuck, restless or swapped, joint speed | | | | | x | x |
+//! | open motor lead, surplus of current | | | | | x | x |
 //! | joint range, tracking error: position mode | | | | | | x |
 //! | tension at a rail | | x | x | x | x | x |
 //! | slack, over-tension, tensions that contradict each other or the stretch | | | | x | x | x |
@@ -182,9 +182,15 @@ impl Supervisor {
         true
     }
 
-    /// Records a fault; `None` if there is one already.
+    /// Records a fault; `None` if there is one already. What the fault line of the gate driver was is told behind the stop:
+    /// [`Fault::DriverWarning`] takes the place of a [`Fault::BridgeFault`], and of nothing else.
     pub fn trip(&mut self, found: Detection, tick: u32) -> Option<FaultRecord> {
-        if self.fault.is_some() {
+        let is_warning = found.fault == Fault::DriverWarning;
+        let may_be_named = match self.fault {
+            None => !is_warning,
+            Some(before) => is_warning && before.fault == Fault::BridgeFault,
+        };
+        if !may_be_named {
             return None;
         }
         let Detection { fault, channel, got, limit } = found;

@@ -117,6 +117,13 @@ impl TensionChannels {
         found.or(inconsistent.filter(|_| checks.load))
     }
 
+    /// Tensions behind the low-pass of the comparison; none where nothing is measured.
+    #[inline]
+    #[must_use]
+    pub fn filtered(&self) -> Option<[Tension; 4]> {
+        self.filtered.as_ref().map(|sums| core::array::from_fn(|n| sums[n].value()))
+    }
+
     /// The channels one by one, and the first fault.
     #[cold]
     #[inline(never)]

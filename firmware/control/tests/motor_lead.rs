@@ -165,11 +165,12 @@ fn a_bench_that_knows_its_dead_zone_and_offset_names_it_sooner() {
 #[test]
 fn a_healthy_joint_is_never_named() {
     // Constants of the motor as it is, over those of the parameters; offset of the current sensor, codes; supply, V.
-    let cases: [(&str, f64, f64, i32, f64); 7] = [
+    let cases: [(&str, f64, f64, i32, f64); 8] = [
         ("as it is", 1.0, 1.0, 0, 24.0),
         ("winding with twice the resistance", 2.0, 1.0, 0, 24.0),
         ("the same, and the sensor's offset", 2.0, 1.0, -3, 24.0),
         ("the same the other way", 2.0, 1.0, 3, 24.0),
+        ("winding with two thirds of the resistance", 0.67, 1.0, 3, 29.0),
         ("weak magnets", 1.0, 0.8, -3, 24.0),
         ("strong magnets, low supply", 1.0, 1.2, 3, 18.3),
         ("everything at once", 2.0, 0.8, -3, 18.3),

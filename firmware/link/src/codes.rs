@@ -124,12 +124,16 @@ faults! {
     13 TensionInconsistent "N" "tensions at the two ends of a sheath do not fit its friction" "check gain and zero of the tension channels, and the sheath parameters";
     14 StretchInconsistent "N" "the tensions of a cable do not fit its stretch, which both encoders tell" "check gain, zero and order of the tension channels, the encoders' zeros, and the pretension";
     15 TensionStuck "N" "a tension channel stands while another one moves" "look for an amplifier that hangs, or a channel without noise";
+    16 TensionSwapped "N" "tensions change against the stretch of their cables" "check which channel is plugged in where (bowden calibrate), then the directions of the encoders";
+    17 TensionRestless "codes" "a tension channel jumps about while the joint is driven" "look for a loose contact and shield the line, or raise supervisor.tension_noise";
     20 OverCurrent "A" "motor current is beyond its limit" "look for a short circuit or a blocked motor";
     21 BusUnderVoltage "V" "bus voltage is too low" "check the supply";
     22 BusOverVoltage "V" "bus voltage is too high" "check the supply; braking may feed energy back";
     23 BridgeFault "" "the bridge reports a fault and switched itself off" "look for over-temperature or a short circuit of the bridge";
     24 WindingHot "A" "the motor's winding is too hot, as its current tells" "let it cool; hold less weight, or correct motor.continuous_current and motor.winding_time";
     25 MotorOpen "A" "no current flows through the motor, though its voltage should make one" "look for a broken or unplugged lead of the motor, then for a dead current sensor";
+    26 MotorCurrent "A" "more current flows than the motor's voltage makes" "look for a leg of the bridge that stays at a rail and a short of the motor, then check motor.resistance and the current channel";
+    27 DriverWarning "ms" "the gate driver pulled its fault line low and let go of it" "let the driver cool and check its supply: that is how it warns; else look for what disturbs the line";
     30 TickOverrun "ticks" "control ticks came too late or were missed" "lower the control rate";
     31 HostSilent "s" "the host fell silent while the joint was moving" "check the cable and the program that sends references";
     32 ParameterStoreCorrupt "" "the stored parameters cannot be read" "store the parameters again; defaults are in use";
@@ -171,12 +175,14 @@ impl FaultRecord {
         match (self.fault as u8, self.channel) {
             (1..=6, 0) => "input encoder",
             (1..=6, _) => "joint encoder",
-            (10..=12 | 15 | 41, 0) => "f1",
-            (10..=12 | 15 | 41, 1) => "f2",
-            (10..=12 | 15 | 41, 2) => "f3",
-            (10..=12 | 15 | 41, _) => "f4",
+            (10..=12 | 15 | 17 | 41, 0) => "f1",
+            (10..=12 | 15 | 17 | 41, 1) => "f2",
+            (10..=12 | 15 | 17 | 41, 2) => "f3",
+            (10..=12 | 15 | 17 | 41, _) => "f4",
             (13 | 14, 0) => "cable a",
             (13 | 14, _) => "cable b",
+            (16, 0) => "f1 and f3",
+            (16, _) => "f2 and f4",
             _ => "",
         }
     }

@@ -484,6 +484,9 @@ impl Board {
         if !machine.bus.rig.inject(injection, on, now_s) {
             match injection {
                 Injection::BridgeFault => machine.bus.set_bridge_fault(on, now),
+                Injection::DriverWarning(half_s) => {
+                    machine.bus.set_driver_warning(on.then_some(half_s), now);
+                }
                 Injection::EncoderBus(at) => {
                     machine.bus.stalled_encoders[usize::from(at == EncoderAt::Joint)] = on;
                 }

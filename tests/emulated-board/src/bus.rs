@@ -86,6 +86,11 @@ pub(crate) struct Bus {
     /// What happened so far.
     pub trace: Trace,
     bridge_fault: bool,
+    /// The gate driver warns: cycles for which its fault line is low, and high again.
+    warning_cycles: Option<u64>,
+    /// Cycle at which the line changes.
+    warning_turns: u64,
+    warning_is_low: bool,
     driver_enabled: bool,
     driver_awake: bool,
     /// Cycle at which the gate driver is awake.
@@ -138,6 +143,9 @@ impl Bus {
             rig,
             trace: Trace::new(),
             bridge_fault: false,
+            warning_cycles: None,
+            warning_turns: NEVER,
+            warning_is_low: false,
             driver_enabled: false,
             driver_awake: false,
             driver_wakes: NEVER,
@@ -226,6 +234,7 @@ impl Bus {
             .min(self.tim1.next_event())
             .min(self.tim1.break_event())
             .min(self.driver_wakes)
+            .min(self.warning_turns)
             .min(self.adc[0].next_event())
             .min(self.adc[1].next_event())
             .min(self.spi[0].next_event())
@@ -254,6 +263,9 @@ impl Bus {
             self.driver_wakes = NEVER;
             self.driver_awake = true;
             self.drive_fault_pin(at);
+        }
+        if self.warning_turns <= at {
+            self.turn_warning(at);
         }
         for index in 0..2 {
             if self.adc[index].next_event() <= at {
@@ -533,7 +545,7 @@ impl Bus {
 
     /// Whether the gate driver pulls its fault line low: a fault, or it is not awake yet.
     fn fault_line_is_low(&self) -> bool {
-        self.bridge_fault || self.driver_enabled && !self.driver_awake
+        self.bridge_fault || self.warning_is_low || self.driver_enabled && !self.driver_awake
     }
 
     /// Whether the gate driver follows its inputs.
@@ -569,6 +581,28 @@ impl Bus {
             self.rig.altered.fault_lines += u64::from(fault && self.hears_fault_line());
             self.drive_fault_pin(now);
         }
+    }
+
+    /// The gate driver warns, its line low and high for `half_s` each, or no longer.
+    pub(crate) fn set_driver_warning(&mut self, half_s: Option<f64>, now: u64) {
+        let now_s = self.seconds(now);
+        self.warning_cycles =
+            half_s.map(|half_s| self.clock.cycle_at(now_s + half_s).saturating_sub(now).max(1));
+        self.warning_is_low = false;
+        self.warning_turns = NEVER;
+        if half_s.is_some() {
+            self.rig.altered.fault_lines += u64::from(self.hears_fault_line());
+            self.turn_warning(now);
+        } else {
+            self.drive_fault_pin(now);
+        }
+    }
+
+    /// The line of a warning changes. A driver that sleeps warns of nothing.
+    fn turn_warning(&mut self, at: u64) {
+        self.warning_is_low = !self.warning_is_low && self.driver_awake;
+        self.warning_turns = self.warning_cycles.map_or(NEVER, |cycles| at + cycles);
+        self.drive_fault_pin(at);
     }
 
     /// What bridge leg `index` does.

@@ -100,6 +100,8 @@ pub enum Injection {
     EncoderMagnetLost(EncoderAt),
     /// The bridge pulls its fault pin low.
     BridgeFault,
+    /// The gate driver warns: it pulls its fault pin low and lets go of it, again and again, each for this long \[s\], and drives on.
+    DriverWarning(f64),
     /// The high switch of a leg of the bridge, 0 or 1, stays open: the leg is at ground.
     LegLow(usize),
     /// A lead of the motor is open.

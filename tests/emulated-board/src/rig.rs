@@ -357,6 +357,7 @@ impl Rig {
             }
             Injection::EncoderBus(_)
             | Injection::BridgeFault
+            | Injection::DriverWarning(_)
             | Injection::LegLow(_)
             | Injection::EncoderDmaError(_)
             | Injection::ProcessorSupply

@@ -83,7 +83,7 @@ pub struct Bench {
     pub controller: Controller,
     pub queues: Queues,
     pub plant: Plant,
-    config: PlantConfig,
+    pub config: PlantConfig,
     enabled: bool,
     duty: f64,
     sequence: u8,
@@ -92,6 +92,8 @@ pub struct Bench {
     pub disturbance: Option<Disturbance>,
     /// A lead of the motor is open.
     pub lead_open: bool,
+    /// The leg of the bridge, 0 or 1, that stays at ground.
+    pub leg_at_ground: Option<usize>,
     /// Voltage of the supply.
     pub bus_v: f64,
     /// Codes that the current sensor shows too much.
@@ -117,6 +119,7 @@ impl Bench {
             random: 1,
             disturbance: None,
             lead_open: false,
+            leg_at_ground: None,
             bus_v: 24.0,
             current_offset_raw: 0,
         }
@@ -183,7 +186,12 @@ impl Bench {
         let step = StepInput {
             // Without a lead the current ends as it does with the bridge open, within 0.1 ms.
             bridge: BridgeInput {
-                duty: self.duty,
+                // Duties of the legs are (1 + d)/2 and (1 - d)/2.
+                duty: match self.leg_at_ground {
+                    None => self.duty,
+                    Some(0) => -0.5 * (1.0 - self.duty),
+                    Some(_) => 0.5 * (1.0 + self.duty),
+                },
                 bus_v: self.bus_v,
                 enabled: self.enabled && !self.lead_open,
             },

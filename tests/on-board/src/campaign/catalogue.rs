@@ -196,6 +196,10 @@ kinds! {
         let (what, act) = (Injection::BridgeFault, Act::Inject(Injection::BridgeFault));
         Trouble { words: in_words(&format!("{what:?}"), lasts_s), place: Place::FaultLine, act, lasts_s }
     };
+    "driver-warning" Actuator "fault line of the gate driver low and high for 20 to 300 us each" &Phase::ALL, |draw| {
+        let warning = Injection::DriverWarning(draw.over_decades(2e-5, 3e-4));
+        injection(draw, Place::FaultLine, warning)
+    };
     "bridge-leg" Actuator "high switch of a leg stays open" &Phase::ALL, |draw| {
         let leg = draw.index(2);
         injection(draw, Place::Motor, Injection::LegLow(leg))

@@ -92,8 +92,8 @@ impl Trouble {
     /// Whether the bridge opens in the moment that it begins.
     pub fn ends_at_once(&self) -> bool {
         let at_once = |injection| {
-            use Injection::{BridgeFault, Crystal, FlashDamage, ProcessorSupply};
-            matches!(injection, BridgeFault | Crystal | FlashDamage | ProcessorSupply)
+            use Injection::{BridgeFault, Crystal, DriverWarning, FlashDamage, ProcessorSupply};
+            matches!(injection, BridgeFault | DriverWarning(_) | Crystal | FlashDamage | ProcessorSupply)
         };
         match self.act {
             Act::Inject(injection) | Act::Again(injection, _) => at_once(injection),

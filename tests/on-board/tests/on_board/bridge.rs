@@ -6,7 +6,7 @@ use bowden_link::{Fault, State, ToBoard};
 use bowden_on_board_tests::Outcome;
 use bowden_on_board_tests::host::Host;
 
-use crate::stop::{checked, moving};
+use crate::stop::{checked, moving, until_open};
 use crate::{ready, switched_on};
 
 /// Lets the marker of the tick fall: a tick that is held half done is a late one.
@@ -35,10 +35,47 @@ fn the_break_input_opens_the_bridge_while_the_core_stands() -> Outcome {
     host.board.clear(Injection::BridgeFault);
     host.board.run_for(5e-3)?;
     assert!(!host.board.pwm().main_output);
-    // The core finds it when it goes on.
+    // The core finds it when it goes on, and that the line is high again.
     host.board.stall_core(false);
+    host.run(2e-3)?;
+    let record = host.await_fault(0.1)?;
+    assert_eq!(record.fault, Fault::DriverWarning, "{record}");
+    checked(&mut host, record)
+}
+
+/// The line of a driver that warns is low and high in turn, 56 us each with a DRV8305; that of a fault stays low until the driver was asleep.
+#[test]
+fn a_warning_of_the_gate_driver_is_told_from_its_fault() -> Outcome {
+    for half_s in [20e-6, 56e-6, 300e-6] {
+        let mut host = moving()?;
+        let began_s = host.board.time_s();
+        host.board.inject(Injection::DriverWarning(half_s));
+        let opening = until_open(&mut host, 1e-3)?;
+        host.run(2e-3)?;
+        let record = host.await_fault(0.1)?;
+        assert_eq!(record.fault, Fault::DriverWarning, "{half_s} s: {record}");
+        assert!(record.limit == 1.0 && f64::from(record.got) <= 1e3 * half_s + 0.2, "{half_s} s: {record}");
+        // Hardware opened it in the first low phase, 0.38 us behind its beginning.
+        assert!(host.board.bridge_events().opened_s - began_s < 1e-6, "{half_s} s: {opening:?}");
+        assert!(!host.board.pwm().enabled, "{half_s} s: the driver is asleep");
+        checked(&mut host, record)?;
+    }
+    // A fault lasts: it keeps its name, and the driver goes to sleep a millisecond later.
+    let mut host = moving()?;
+    host.board.inject(Injection::BridgeFault);
+    host.run(0.8e-3)?;
+    assert!(
+        host.board.pwm().enabled && host.board.pwm().duty.is_none(),
+        "the driver is awake, the bridge open"
+    );
+    host.run(0.5e-3)?;
+    assert!(!host.board.pwm().enabled, "asleep behind a fault");
     let record = host.await_fault(0.1)?;
     assert_eq!(record.fault, Fault::BridgeFault, "{record}");
+    // What comes later is not its warning.
+    host.board.clear(Injection::BridgeFault);
+    host.run(5e-3)?;
+    assert_eq!(host.status()?.fault, Some(record));
     checked(&mut host, record)
 }
 
@@ -81,7 +118,8 @@ fn a_short_pulse_on_the_fault_line_is_no_fault() -> Outcome {
     host.board.run_for(0.4e-6)?;
     host.board.clear(Injection::BridgeFault);
     host.board.stall_core(false);
-    assert_eq!(host.await_fault(0.1)?.fault, Fault::BridgeFault);
+    host.run(2e-3)?;
+    assert_eq!(host.await_fault(0.1)?.fault, Fault::DriverWarning);
     Ok(())
 }
 

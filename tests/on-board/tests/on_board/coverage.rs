@@ -3,7 +3,7 @@
 use bowden_link::Fault;
 
 /// Sources of the tests that provoke faults.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 8] = [
     include_str!("faults.rs"),
     include_str!("failures.rs"),
     include_str!("flash.rs"),
@@ -11,6 +11,7 @@ const SOURCES: [&str; 7] = [
     include_str!("clock.rs"),
     include_str!("ripple_table.rs"),
     include_str!("motor_lead.rs"),
+    include_str!("bridge.rs"),
 ];
 
 /// The test that provokes `fault`.
@@ -25,6 +26,10 @@ fn test_of(fault: Fault) -> &'static str {
         Fault::JointRange => "a_joint_beyond_its_range_is_found",
         Fault::TrackingError => "a_joint_that_does_not_follow_is_found",
         Fault::TensionStuck => "a_tension_channel_that_stands_is_found",
+        Fault::TensionSwapped => "exchanged_tension_channels_are_found",
+        Fault::TensionRestless => "a_tension_channel_that_jumps_about_is_found",
+        Fault::MotorCurrent => "a_leg_at_ground_stops_before_a_tendon_is_overloaded",
+        Fault::DriverWarning => "a_warning_of_the_gate_driver_is_told_from_its_fault",
         Fault::EncoderJump => "a_loose_magnet_is_a_jump",
         Fault::TensionRail => "a_broken_tension_wire_is_at_a_rail",
         Fault::Slack | Fault::OverTension => "slack_and_overload_are_found",

@@ -74,6 +74,7 @@ fn channels_that_are_swapped_or_stuck_are_found_while_the_sheaths_move() -> Outc
                     | Fault::Slack
                     | Fault::OverTension
                     | Fault::TensionStuck
+                    | Fault::TensionSwapped
             ),
             "{injection:?}: {fault:?}"
         );

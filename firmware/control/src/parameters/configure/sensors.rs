@@ -11,6 +11,7 @@ use crate::motor_circuit::{CircuitConfig, RESISTANCE_FACTOR};
 use crate::parameters::Parameters;
 use crate::scale::{Code, Current, Quantity, Share, Tension, Voltage, Weight};
 use crate::supply::SupplyConfig;
+use crate::surplus_current::{CURRENT_FACTOR, SurplusConfig};
 use crate::tension::{TensionConfig, V_PER_CODE};
 use crate::winding::WindingConfig;
 
@@ -109,6 +110,14 @@ pub(super) fn circuit(parameters: &Parameters, period_s: f32) -> Result<CircuitC
         least: gain(1.0 / (RESISTANCE_FACTOR * motor.resistance), "motor.resistance")?,
         none: Current::from_f32(none_a),
         most: Current::from_f32(none_a + rest_a),
+    })
+}
+
+/// The same: [`crate::surplus_current`].
+pub(super) fn surplus(parameters: &Parameters) -> Result<SurplusConfig, Refusal> {
+    Ok(SurplusConfig {
+        back_emf: gain(torque_constant(parameters), "motor.torque_constant")?,
+        greatest: gain(CURRENT_FACTOR / parameters.motor.resistance, "motor.resistance")?,
     })
 }
 
