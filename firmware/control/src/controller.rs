@@ -21,10 +21,11 @@ use crate::motion_watch::{MotionWatch, Turn};
 use crate::motor_circuit::MotorCircuit;
 use crate::observer::{Motion, Observer};
 use crate::reference::{Origin, ReferenceConfig, ReferenceState};
-use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
+use crate::restless_channels::RestlessChannels;
+use crate::scale::{Angle, Current, Quantity, Speed, Tension, Torque, Voltage};
 use crate::sheath::{Fitted, SheathEstimate, SheathInput, SheathObserver};
 use crate::supervisor::{Situation, Supervisor};
-use crate::supply::{Supply, SupplyReading};
+use crate::supply::Supply;
 use crate::surplus_current::SurplusCurrent;
 use crate::tension::TensionChannels;
 use crate::tick::{Command, Inbox, TickConfig, TickInput, TickOutput};
@@ -39,6 +40,7 @@ pub struct Controller {
     motion: MotionWatch,
     circuit: MotorCircuit,
     surplus: SurplusCurrent,
+    restless: RestlessChannels,
     order: ChannelOrder,
     tensions: TensionChannels,
     supply: Supply,
@@ -96,6 +98,7 @@ impl Controller {
             motion: MotionWatch::default(),
             circuit: MotorCircuit::default(),
             surplus: SurplusCurrent::default(),
+            restless: RestlessChannels::default(),
             order: ChannelOrder::default(),
             tensions: TensionChannels::default(),
             supply: Supply::default(),
@@ -147,6 +150,7 @@ impl Controller {
             self.motion.reset();
             self.circuit.reset();
             self.surplus.reset();
+            self.restless.reset();
             self.order.reset();
             self.starts = false;
             // A joint that rests expects no friction.
@@ -230,6 +234,7 @@ impl Controller {
         self.motion = MotionWatch::default();
         self.circuit = MotorCircuit::default();
         self.surplus = SurplusCurrent::default();
+        self.restless = RestlessChannels::default();
         self.order = ChannelOrder::default();
         self.tensions = TensionChannels::default();
         self.supply = Supply::default();
@@ -310,11 +315,16 @@ impl Controller {
             let bridge = heard.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
             let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
             let encoder = pulley.fault.map(|bad| of(0, bad)).or_else(|| joint.fault.map(|bad| of(1, bad)));
-            bridge
-                .or(supply.found)
-                .or(encoder)
-                .or(tension)
-                .or_else(|| self.watch_motion(input, counts, theta, lag, motion, &tensions, &supply))
+            bridge.or(supply.found).or(encoder).or(tension).or_else(|| {
+                self.watch_motion(
+                    input,
+                    counts,
+                    theta,
+                    motion.speed,
+                    &tensions,
+                    (supply.current, supply.bus_filtered),
+                )
+            })
         } else {
             None
         };
@@ -328,10 +338,9 @@ impl Controller {
         input: &TickInput,
         counts: [i32; 2],
         theta: [Angle; 2],
-        lag: Angle,
-        motion: Motion,
+        speed_in: Speed,
         tensions: &[Tension; 4],
-        supply: &SupplyReading,
+        (current, bus): (Current, Voltage),
     ) -> Option<Detection> {
         if !self.supervisor.state().drives() {
             return None;
@@ -342,23 +351,25 @@ impl Controller {
             return Some(Detection { fault: bowden_link::Fault::EncoderStuck, channel, got, limit });
         }
         match self.motion.turn(&self.config.motion)? {
-            Turn::Surplus => {
-                let (current, bus) = (supply.current, supply.bus_filtered);
-                self.surplus.look(
-                    &self.config.surplus,
-                    &self.config.circuit,
-                    current,
-                    motion.speed,
-                    bus,
-                    self.config.rate_hz,
-                )
+            Turn::SurplusSpeed => {
+                self.surplus.speed(&self.config.circuit, speed_in);
+                None
+            }
+            Turn::SurplusCurrent => self.surplus.current(&self.config.circuit, current, bus),
+            Turn::Remember => {
+                self.restless.remember(&input.tension_raw);
+                None
+            }
+            Turn::Jumps => {
+                let (config, variance_raw) = (&self.config.tension, &self.config.supervisor.noise_limit);
+                self.restless.look(config.fitted, variance_raw, &input.tension_raw)
             }
             Turn::Order => {
                 let config = &self.config.tension;
-                self.tensions.filtered().and_then(|ends| self.order.look(config, ends, lag))
+                self.tensions.filtered().and_then(|tensions| self.order.look(config, tensions, theta[0]))
             }
             Turn::Voltage => {
-                self.circuit.voltage(&self.config.circuit, theta[0], supply.bus_filtered);
+                self.circuit.voltage(&self.config.circuit, theta[0], bus);
                 None
             }
             Turn::Current => self.circuit.current(&self.config.circuit),
@@ -366,13 +377,9 @@ impl Controller {
                 let follows =
                     self.supervisor.state() == State::Run && self.supervisor.mode() == Mode::Position;
                 let reference = follows.then(|| Angle::from_bits(self.reference.value_bits()));
-                self.motion.remember(&input.tension_raw);
                 self.motion.joint(&self.config.motion, theta[1], reference)
             }
-            Turn::Tension(n) => {
-                let (config, variance_raw) = (&self.config.motion, &self.config.supervisor.noise_limit);
-                self.motion.tension(config, n, &input.tension_raw, tensions, variance_raw)
-            }
+            Turn::Tension(n) => self.motion.tension(&self.config.motion, n, &input.tension_raw, tensions),
         }
     }
 

@@ -38,6 +38,7 @@ pub mod motor_circuit;
 pub mod observer;
 pub mod parameters;
 pub mod reference;
+pub mod restless_channels;
 pub mod scale;
 pub mod service;
 pub mod sheath;

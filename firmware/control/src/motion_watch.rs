@@ -8,16 +8,10 @@
 //! | joint range | position mode | the measured angle is beyond the range of the reference, and beyond the reference, by a margin |
 //! | tracking error | position mode | at every look for a time, the angle was farther from the reference than it may be |
 //! | tension stuck | every mode, homing too | at every look for a time, a channel had the same code, while another one moved |
-//! | tension restless | every mode, homing too | looks at which a channel had jumped since the tick before outweigh the others |
 //!
 //! A joint that follows its reference back into a range that was narrowed, or from where it rested, is no fault. Homing has no range. A
 //! count of an encoder in 10 ms is 0.15 rad/s. A tension channel has the noise of its amplifier; at a standard deviation of one code it
 //! repeats a code in two of five looks at most, so 30 in a row are one in 10¹¹.
-//!
-//! A jump is a change from one tick to the next beyond four standard deviations of a difference of two readings with the noise of
-//! `supervisor.tension_noise`: white noise as large as the self test lets pass makes one in 16 000 looks. Each counts four up, each look
-//! without one down, and 40 are a fault: noise of three times that size, 18 % of whose looks are jumps, is never named in the mean, of four times,
-//! 32 %, after 0.7 s, and of eight times, 62 %, after 0.2 s. A tension itself changes by 2 N a tick in a blow of 5 ms that ends at its limit, and not for long.
 
 use bowden_link::Fault;
 
@@ -28,16 +22,10 @@ use crate::sheath::Fitted;
 /// Time between two looks, s.
 pub const LOOK_S: f32 = 0.01;
 
-/// Square of a change from one tick to the next that counts as a jump, over the largest variance of a reading: 4² of a variance twice as large.
-const JUMP_SQUARE: u32 = 32;
-/// What a jump counts, and what is a fault.
-const JUMP: u8 = 4;
-const JUMPS: u8 = 40;
-
 /// What is allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionConfig {
-    /// Ticks from one look to the next, at least 8.
+    /// Ticks from one look to the next, at least 13.
     pub look_ticks: u16,
     /// Largest turn of the joint between two looks.
     pub travel: Angle,
@@ -76,9 +64,6 @@ pub struct MotionWatch {
     theta_out: Option<Angle>,
     error_looks: u16,
     standing: [Standing; 4],
-    /// Codes in the tick before a look at one of them, and what its jumps count.
-    before_raw: [u16; 4],
-    jumps: [u8; 4],
     /// Channels that were looked at, a bit each.
     begun: u8,
 }
@@ -92,8 +77,14 @@ pub const fn samples(look_ticks: u16) -> u16 {
 /// What a tick looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// Whether the motor's current is beyond what its voltage makes, see [`crate::surplus_current`].
-    Surplus,
+    /// Back-EMF of the motor, see [`crate::surplus_current`].
+    SurplusSpeed,
+    /// Whether its current is beyond what its voltage makes.
+    SurplusCurrent,
+    /// Codes of the tension channels, to be kept for the next tick, see [`crate::restless_channels`].
+    Remember,
+    /// Their jumps since then.
+    Jumps,
     /// Order of the tension channels, see [`crate::channel_order`].
     Order,
     /// Voltage of the motor since the last look, see [`crate::motor_circuit`].
@@ -112,7 +103,6 @@ impl MotionWatch {
         self.left = 0;
         self.theta_out = None;
         self.begun = 0;
-        self.jumps = [0; 4];
     }
 
     /// Counts a tick; what it is to look at. One thing at a time, so that no tick is much longer than the others.
@@ -123,12 +113,19 @@ impl MotionWatch {
         }
         self.left -= 1;
         // Nearly always.
-        if self.left > 7 {
-            // Two ticks behind a sample of the duty.
-            return if self.left % 4 == 1 { Some(Turn::Surplus) } else { None };
+        if self.left > 11 {
+            // Two and three ticks behind a sample of the duty.
+            return match self.left % 4 {
+                1 => Some(Turn::SurplusSpeed),
+                0 => Some(Turn::SurplusCurrent),
+                _ => None,
+            };
         }
         Some(match self.left {
-            7 => Turn::Order,
+            11 => Turn::Remember,
+            10 => Turn::Jumps,
+            8 => Turn::Order,
+            7 | 9 => return None,
             6 => Turn::Voltage,
             5 => Turn::Current,
             4 => Turn::Joint,
@@ -141,12 +138,6 @@ impl MotionWatch {
     #[must_use]
     pub const fn samples_now(&self) -> bool {
         self.left % 4 == 3
-    }
-
-    /// Keeps the codes of the tick before the looks at the channels.
-    #[inline]
-    pub const fn remember(&mut self, tension_raw: &[u16; 4]) {
-        self.before_raw = *tension_raw;
     }
 
     /// A look at the joint: speed, and where it follows `reference`, range and error. The first fault.
@@ -205,7 +196,7 @@ impl MotionWatch {
         }
     }
 
-    /// A look at tension channel `n`, 0 to 3; `variance_raw` is the largest of each channel, codes², in 2⁻⁸.
+    /// A look at tension channel `n`, 0 to 3.
     #[inline(never)]
     pub fn tension(
         &mut self,
@@ -213,20 +204,8 @@ impl MotionWatch {
         n: usize,
         tension_raw: &[u16; 4],
         tensions: &[Tension; 4],
-        variance_raw: &[u32; 4],
     ) -> Option<Detection> {
         let n = n & 3;
-        let change_raw = tension_raw[n].abs_diff(self.before_raw[n]);
-        self.before_raw = *tension_raw;
-        // A code has 12 bits, so its square fits with eight places; 2⁸/32 are 2³.
-        if u32::from(change_raw) * u32::from(change_raw) * (256 / JUMP_SQUARE) > variance_raw[n] {
-            self.jumps[n] = self.jumps[n].saturating_add(JUMP);
-            if self.jumps[n] >= JUMPS && config.fitted.has(n) {
-                return Some(restless(n, change_raw, variance_raw[n]));
-            }
-        } else {
-            self.jumps[n] = self.jumps[n].saturating_sub(1);
-        }
         let standing = &mut self.standing[n];
         let bit = 1 << n;
         if self.begun & bit == 0 || standing.code_raw != tension_raw[n] {
@@ -249,14 +228,6 @@ impl MotionWatch {
     }
 }
 
-/// A channel that jumps about, with its last jump.
-#[cold]
-#[inline(never)]
-fn restless(n: usize, change_raw: u16, variance_raw: u32) -> Detection {
-    let limit_raw = libm::sqrtf(variance_raw as f32 * (JUMP_SQUARE as f32 / 256.0));
-    Detection::new(Fault::TensionRestless, n, f32::from(change_raw), limit_raw)
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -276,9 +247,6 @@ mod tests {
         fitted: Fitted::All,
     };
 
-    /// 200 codes²: four standard deviations of a difference are 80 codes.
-    const VARIANCE_RAW: [u32; 4] = [200 << 8; 4];
-
     /// A look at this angle and reference; codes and tensions of channels as given, 1 N a code.
     fn look(
         watch: &mut MotionWatch,
@@ -289,38 +257,33 @@ mod tests {
     ) -> Option<Detection> {
         let tensions = tension_raw.map(|code_raw| Tension::from_f32(f32::from(code_raw)));
         let joint = watch.joint(config, Angle::from_f32(theta_out_rad), reference_rad.map(Angle::from_f32));
-        watch.remember(&tension_raw);
-        let stuck =
-            (0..4).filter_map(|n| watch.tension(config, n, &tension_raw, &tensions, &VARIANCE_RAW)).last();
+        let stuck = (0..4).filter_map(|n| watch.tension(config, n, &tension_raw, &tensions)).last();
         joint.or(stuck)
     }
 
-    /// By hand: of ten ticks the first looks for a surplus of current, the third at the order of the channels, the next two at the motor, the sixth at the
-    /// joint, the others behind it at f4 to f1; the third and the seventh take samples, two ticks before a look for a surplus at the tenth before the last.
+    /// By hand: of 15 ticks the second and the third look for a surplus of current, two and three behind a sample; the fourth keeps
+    /// the codes of the channels for the fifth, the seventh looks at their order, the ninth and the tenth at the motor, the eleventh at the joint, the others
+    /// behind it at f4 to f1; the fourth, the eighth and the twelfth take samples.
     #[test]
     fn every_round_looks_at_each_once() {
         let mut watch = MotionWatch::default();
-        let config = || MotionConfig { look_ticks: 10, ..CONFIG() };
-        let round = [
-            Some(Turn::Surplus),
-            None,
-            Some(Turn::Order),
-            Some(Turn::Voltage),
-            Some(Turn::Current),
-            Some(Turn::Joint),
-        ];
+        let config = || MotionConfig { look_ticks: 15, ..CONFIG() };
+        let surplus = [None, Some(Turn::SurplusSpeed), Some(Turn::SurplusCurrent)];
+        let cables = [Some(Turn::Remember), Some(Turn::Jumps), None, Some(Turn::Order), None];
+        let joint = [Some(Turn::Voltage), Some(Turn::Current), Some(Turn::Joint)];
+        let round = [&surplus[..], &cables, &joint].concat();
         let channels = [3, 2, 1, 0].map(|channel| Some(Turn::Tension(channel)));
         let expected = [&round[..], &channels].concat();
         for _ in 0..2 {
-            let turns: Vec<_> = (0..10).map(|_| (watch.turn(&config()), watch.samples_now())).collect();
+            let turns: Vec<_> = (0..15).map(|_| (watch.turn(&config()), watch.samples_now())).collect();
             let (turns, sampled): (Vec<_>, Vec<_>) = turns.into_iter().unzip();
             assert_eq!(turns, expected);
-            let taken: Vec<_> = (0..10).filter(|n| sampled[*n]).collect();
-            assert_eq!((taken.len(), taken), (usize::from(samples(10)), [2, 6].to_vec()));
+            let taken: Vec<_> = (0..15).filter(|n| sampled[*n]).collect();
+            assert_eq!((taken.len(), taken), (usize::from(samples(15)), [3, 7, 11].to_vec()));
         }
         watch.turn(&config());
         watch.reset();
-        assert_eq!((0..6).map(|_| watch.turn(&config())).collect::<Vec<_>>(), round);
+        assert_eq!((0..11).map(|_| watch.turn(&config())).collect::<Vec<_>>(), round);
     }
 
     /// 0.05 rad in 10 ms are 5 rad/s.
@@ -390,28 +353,5 @@ mod tests {
             run(&of_the_motor, |n| [30, n, 90 - n, 0]).map(|(n, found)| (n, found.channel)),
             Some((10, 0))
         );
-    }
-
-    /// Jumps of 100 codes at every look, limit 80: 4 each, so the tenth is named; at every third look, 4 less 2, the twentieth at the 58th look.
-    #[test]
-    fn a_channel_that_jumps_about_is_restless() {
-        let run = |config: &MotionConfig, every: u16, jump_raw: u16| {
-            let mut watch = MotionWatch::default();
-            (0..200).find_map(|n| {
-                watch.remember(&[1000 + n % 7; 4]);
-                let jumped = if n % every == 0 { jump_raw } else { 0 };
-                let tension_raw = [1000 + n % 7, 1000, 1000 + n % 7 + jumped, 1000 + n % 3];
-                let tensions = [Tension::ZERO; 4];
-                watch.tension(config, 2, &tension_raw, &tensions, &VARIANCE_RAW).map(|found| (n, found))
-            })
-        };
-        let config = CONFIG();
-        let named = Detection::new(Fault::TensionRestless, 2, 100.0, 80.0);
-        assert_eq!(run(&config, 1, 100), Some((9, named)));
-        assert_eq!(run(&config, 3, 100), Some((54, named)));
-        // A jump in five looks, and changes that are no jumps.
-        assert_eq!((run(&config, 5, 100), run(&config, 1, 80)), (None, None));
-        let of_the_motor = MotionConfig { fitted: Fitted::Nothing, ..config };
-        assert_eq!(run(&of_the_motor, 1, 100), None);
     }
 }

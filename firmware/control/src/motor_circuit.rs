@@ -50,12 +50,12 @@ use bowden_link::message::Refusal;
 
 use crate::detection::Detection;
 use crate::parameters::{Parameters, tick_config};
-use crate::scale::{Angle, Current, Gain, Quantity, Ratio, Share, Voltage};
+use crate::scale::{Angle, Current, Gain, Quantity, Ratio, Share, Speed, Voltage};
 
 /// Largest resistance, with its margin for the way to a steady state, over the one of the parameters.
 pub const RESISTANCE_FACTOR: f32 = 1.25 * 2.0;
 /// Part of the back-EMF by which it may be off.
-pub(crate) const BACK_EMF_TOLERANCE: Ratio = Ratio::from_parts(1, 4);
+const BACK_EMF_TOLERANCE: Ratio = Ratio::from_parts(1, 4);
 /// Looks in a row.
 const LOOKS: i8 = 3;
 /// Bits of a current that the sum over a look leaves out, so that it fits: 0.24 mA are left.
@@ -70,6 +70,10 @@ pub struct CircuitConfig {
     pub reversed: bool,
     /// `k_e N / T`: back-EMF from the turn of the input pulley in a look.
     pub back_emf: Gain<Angle, Voltage>,
+    /// `k_e N`: the same from the speed of the input pulley, see [`crate::surplus_current`].
+    pub back_emf_of_speed: Gain<Speed, Voltage>,
+    /// `2/R`: largest current of a voltage, there.
+    pub greatest: Gain<Voltage, Current>,
     /// Back-EMF of a count of the encoder in a look.
     pub count: Voltage,
     /// Largest dead zone of the bridge, duty.

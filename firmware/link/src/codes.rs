@@ -124,7 +124,7 @@ faults! {
     13 TensionInconsistent "N" "tensions at the two ends of a sheath do not fit its friction" "check gain and zero of the tension channels, and the sheath parameters";
     14 StretchInconsistent "N" "the tensions of a cable do not fit its stretch, which both encoders tell" "check gain, zero and order of the tension channels, the encoders' zeros, and the pretension";
     15 TensionStuck "N" "a tension channel stands while another one moves" "look for an amplifier that hangs, or a channel without noise";
-    16 TensionSwapped "N" "tensions change against the stretch of their cables" "check which channel is plugged in where (bowden calibrate), then the directions of the encoders";
+    16 TensionSwapped "N" "tensions change as those of exchanged channels do, against friction or load" "check which channel is plugged in where (bowden calibrate), then encoder.input.direction";
     17 TensionRestless "codes" "a tension channel jumps about while the joint is driven" "look for a loose contact and shield the line, or raise supervisor.tension_noise";
     20 OverCurrent "A" "motor current is beyond its limit" "look for a short circuit or a blocked motor";
     21 BusUnderVoltage "V" "bus voltage is too low" "check the supply";
@@ -182,7 +182,9 @@ impl FaultRecord {
             (13 | 14, 0) => "cable a",
             (13 | 14, _) => "cable b",
             (16, 0) => "f1 and f3",
-            (16, _) => "f2 and f4",
+            (16, 1) => "f2 and f4",
+            (16, 2) => "f1 and f2",
+            (16, _) => "f3 and f4",
             _ => "",
         }
     }

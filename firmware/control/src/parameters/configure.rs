@@ -31,11 +31,10 @@ use crate::scale::{Angle, Current, Gain, Quantity, Speed, Tension, Torque};
 use crate::sheath::{Fitted, SheathConfig};
 use crate::supervisor::SupervisorConfig;
 use crate::supply::SupplyConfig;
-use crate::surplus_current::SurplusConfig;
 use crate::tension::TensionConfig;
 use estimates::{observer, sheath};
 use loops::{drive, position, torque, torque_gains};
-use sensors::{circuit, encoder, supply, surplus, tension};
+use sensors::{circuit, encoder, supply, tension};
 
 /// Angle of a count, rad.
 const RAD_PER_COUNT: f32 = core::f32::consts::TAU / CountRaw::PER_TURN as f32;
@@ -48,7 +47,6 @@ pub struct TickConfig {
     pub(crate) stuck: StuckConfig,
     pub(crate) motion: MotionConfig,
     pub(crate) circuit: CircuitConfig,
-    pub(crate) surplus: SurplusConfig,
     pub(crate) tension: TensionConfig,
     pub(crate) supply: SupplyConfig,
     pub(crate) input_radius: Gain<Tension, Torque>,
@@ -85,7 +83,6 @@ impl TickConfig {
             stuck,
             motion,
             circuit,
-            surplus,
             tension,
             supply,
             input_radius,
@@ -115,7 +112,6 @@ impl TickConfig {
         self.stuck = *stuck;
         self.motion = *motion;
         self.circuit = *circuit;
-        self.surplus = *surplus;
         self.tension = *tension;
         self.supply = *supply;
         self.input_radius = *input_radius;
@@ -170,7 +166,6 @@ pub fn tick_config(parameters: &Parameters) -> Result<TickConfig, Refusal> {
         },
         motion: motion(parameters, period_s, reach.angle),
         circuit: circuit(parameters, period_s)?,
-        surplus: surplus(parameters)?,
         tension: tension(parameters, period_s)?,
         supply: supply(parameters, period_s)?,
         input_radius: gain(parameters.pulley.input_radius, "pulley.input_radius")?,

@@ -125,7 +125,8 @@ fn a_tension_channel_that_stands_is_found() -> Outcome {
 #[test]
 fn exchanged_tension_channels_are_found() -> Outcome {
     use TensionAt::{F1, F2, F3, F4};
-    for (swapped, end) in [([F1, F3], 0), ([F2, F4], 1), ([F1, F4], 1), ([F2, F3], 1)] {
+    let pairs = [([F1, F3], 0), ([F2, F4], 1), ([F1, F2], 2), ([F3, F4], 3)];
+    for (swapped, end) in pairs {
         let mut host = switched_on(1)?;
         host.board.inject(Injection::TensionSwapped(swapped[0], swapped[1]));
         host.make_ready()?;
@@ -148,16 +149,16 @@ fn exchanged_tension_channels_are_found() -> Outcome {
     Ok(())
 }
 
-/// 8 N of noise, sixteen times what may be there at rest: two of three looks see a jump, and 40 are gathered in 0.2 s in the mean.
+/// 8 N of noise, sixteen times what may be there at rest: four of five looks see a jump, and six of them take 0.2 s at least.
 #[test]
 fn a_tension_channel_that_jumps_about_is_found() -> Outcome {
     let mut host = ready(1)?;
     without_comparisons(&mut host)?;
     host.follow(LIVELY)?;
     host.run(1.0)?;
-    let (record, opening) = stop_by(&mut host, Injection::TensionNoise(TensionAt::F3, 8.0), 0.6)?;
+    let (record, opening) = stop_by(&mut host, Injection::TensionNoise(TensionAt::F3, 8.0), 0.8)?;
     assert_eq!((record.fault, record.channel), (Fault::TensionRestless, 2), "{record}");
-    assert!((0.09..0.5).contains(&opening.after_s), "{record}: {opening:?}");
+    assert!((0.2..0.7).contains(&opening.after_s), "{record}: {opening:?}");
     Ok(())
 }
 

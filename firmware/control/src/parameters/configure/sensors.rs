@@ -11,7 +11,7 @@ use crate::motor_circuit::{CircuitConfig, RESISTANCE_FACTOR};
 use crate::parameters::Parameters;
 use crate::scale::{Code, Current, Quantity, Share, Tension, Voltage, Weight};
 use crate::supply::SupplyConfig;
-use crate::surplus_current::{CURRENT_FACTOR, SurplusConfig};
+use crate::surplus_current::CURRENT_FACTOR;
 use crate::tension::{TensionConfig, V_PER_CODE};
 use crate::winding::WindingConfig;
 
@@ -105,19 +105,13 @@ pub(super) fn circuit(parameters: &Parameters, period_s: f32) -> Result<CircuitC
         per_sample: ((1_u64 << 32) / u64::from(samples(look_ticks))) as i32,
         reversed: bridge.direction < 0.0,
         back_emf: gain(back_emf, "motor.torque_constant")?,
+        back_emf_of_speed: gain(torque_constant(parameters), "motor.torque_constant")?,
+        greatest: gain(CURRENT_FACTOR / motor.resistance, "motor.resistance")?,
         count: Voltage::from_f32(back_emf * RAD_PER_COUNT),
         dead_zone: Share::from_f32(parameters.correction.dead_zone.limit),
         least: gain(1.0 / (RESISTANCE_FACTOR * motor.resistance), "motor.resistance")?,
         none: Current::from_f32(none_a),
         most: Current::from_f32(none_a + rest_a),
-    })
-}
-
-/// The same: [`crate::surplus_current`].
-pub(super) fn surplus(parameters: &Parameters) -> Result<SurplusConfig, Refusal> {
-    Ok(SurplusConfig {
-        back_emf: gain(torque_constant(parameters), "motor.torque_constant")?,
-        greatest: gain(CURRENT_FACTOR / parameters.motor.resistance, "motor.resistance")?,
     })
 }
 
