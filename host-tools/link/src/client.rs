@@ -40,7 +40,7 @@ pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// Board time around an absence that is not counted as such, at most: from the last sample to the break, and until the board has told
 /// its count.
-const UNSEEN: Duration = Duration::from_secs(10);
+const UNSEEN: Duration = Duration::from_secs(1);
 
 /// Bytes that one read takes at most.
 const READ_LENGTH: usize = 4096;
@@ -230,8 +230,8 @@ impl Client {
         let may_have_wrapped =
             expected.is_some_and(|expected| u64::from(expected as u32) + most > u64::from(u32::MAX));
         let is_young = if may_have_wrapped {
-            // A low count says nothing; less than the gap does. Both clocks are good to a thousandth.
-            passed.is_some_and(|passed| u64::from(passed) < gap - gap / 1000)
+            // A low count says nothing; the ticks since the last sample do. Both clocks are good to a thousandth.
+            passed.is_some_and(|passed| !(gap - gap / 1000..=most + gap / 1000).contains(&u64::from(passed)))
         } else {
             u64::from(status.tick) <= gap
         };

@@ -168,7 +168,8 @@ fn a_fault_during_the_run_is_reported_and_keeps_the_recording() {
 
 #[test]
 fn the_ticks_before_a_fault_are_kept_where_their_count_wraps() {
-    let mut fake = Fake { tick: u32::MAX - 40, ..Fake::new(Mishaps::default()) };
+    let mut fake = Fake::new(Mishaps::default());
+    fake.tick = u32::MAX - 40;
     fake.advance_to(Duration::from_micros(6400));
     fake.state = State::Fault;
     let terminal = Terminal::new(fake);
