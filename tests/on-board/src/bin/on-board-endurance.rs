@@ -115,7 +115,7 @@ fn endure(options: &Options) -> Outcome {
         let run = native::run(&native::Plan::WRAP, &mut |number, span| {
             println!("{}", error_line("40 s", number, span))
         })?;
-        print("counters at their ends, natively", &run.checks, begun, &mut failed);
+        print("counters at their ends, natively", &run.all_checks(), begun, &mut failed);
         let wrap = page::native(&run, "40 s", provenance);
         put(page.as_deref(), |sections| sections.wrap = Some(wrap))?;
 
@@ -123,7 +123,7 @@ fn endure(options: &Options) -> Outcome {
         let name = if plan.parts == native::PARTS_AN_HOUR { "hour" } else { "quarter" };
         let begun = Instant::now();
         let run = native::run(&plan, &mut |number, span| println!("{}", error_line(name, number, span)))?;
-        print(&format!("{native_hours} h natively"), &run.checks, begun, &mut failed);
+        print(&format!("{native_hours} h natively"), &run.all_checks(), begun, &mut failed);
         let native = page::native(&run, name, provenance);
         put(page.as_deref(), |sections| sections.native = Some(native))?;
     }
@@ -140,7 +140,7 @@ fn endure(options: &Options) -> Outcome {
                 upkeep.memory_kib
             );
         })?;
-        print(&format!("{emulated_seconds} s on the emulated board"), &run.checks, begun, &mut failed);
+        print(&format!("{emulated_seconds} s on the emulated board"), &run.all_checks(), begun, &mut failed);
         let emulated = page::emulated(&run, name, provenance);
         put(page.as_deref(), |sections| sections.emulated = Some(emulated))?;
     }

@@ -71,6 +71,15 @@ pub struct EmulatedRun {
     pub upkeep: Vec<Upkeep>,
     /// What has to hold.
     pub checks: Vec<Check>,
+    /// The same of the memory of this process, which other work in it takes as well.
+    pub memory: Check,
+}
+
+impl EmulatedRun {
+    /// All that has to hold in a process that does nothing else.
+    pub fn all_checks(&self) -> Vec<Check> {
+        self.checks.iter().chain([&self.memory]).cloned().collect()
+    }
 }
 
 /// Runs the image `elf` by `plan`; `progress` hears of each span that has ended.
@@ -141,10 +150,18 @@ pub fn run(elf: &[u8], plan: &Plan, progress: &mut dyn FnMut(usize, &Span, &Upke
     ];
     checks.extend(drift::checks(drift.spans()));
     checks.extend(growth(&upkeep));
-    Ok(EmulatedRun { samples: received, spans: drift.spans().to_vec(), upkeep, checks })
+    let memory = memory(&upkeep);
+    Ok(EmulatedRun { samples: received, spans: drift.spans().to_vec(), upkeep, checks, memory })
 }
 
-/// Whether ticks, stack and memory of later spans are those of the first one.
+/// Memory at the end against that at the end of the first span.
+fn memory(upkeep: &[Upkeep]) -> Check {
+    let kib = |span: Option<&Upkeep>| span.map_or(0, |span| span.memory_kib);
+    let grown = kib(upkeep.last()).saturating_sub(kib(upkeep.first()));
+    Check::at_most("growth of this process in RAM since the first span, KiB", grown, GROWTH_KIB)
+}
+
+/// Whether ticks and stack of later spans are those of the first one.
 fn growth(upkeep: &[Upkeep]) -> Vec<Check> {
     let (Some(first), Some(last)) = (upkeep.first(), upkeep.last()) else { return Vec::new() };
     let longest = upkeep.iter().map(|span| span.busy.max).max().unwrap_or(0);
@@ -153,10 +170,5 @@ fn growth(upkeep: &[Upkeep]) -> Vec<Check> {
         Check::at_most("longest tick by its marker, cycles", longest, first.busy.max + LONGER_CYCLES),
         Check::at_most("jitter of the tick, peak to peak, cycles", jitter, PERIOD_CYCLES / 50),
         Check::at_most("deepest stack, bytes", last.stack_bytes, first.stack_bytes + DEEPER_BYTES),
-        Check::at_most(
-            "growth of this process in RAM since the first span, KiB",
-            last.memory_kib.saturating_sub(first.memory_kib),
-            GROWTH_KIB,
-        ),
     ]
 }

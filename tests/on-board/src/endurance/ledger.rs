@@ -26,15 +26,19 @@ impl Ledger {
         }
         self.next_tick = tick.wrapping_add(1);
         self.count += 1;
-        let Sample { encoder_count_raw, tension_raw, current_raw, duty_raw, reference_raw, .. } = *sample;
+        let Sample { encoder_count_raw, tension_raw, reference_raw, command_raw, .. } = *sample;
         let pair = |a: i32, b: i32| u64::from(a.cast_unsigned()) << 32 | u64::from(b.cast_unsigned());
         let [f1, f2, f3, f4] = tension_raw.map(u64::from);
+        let [current, bus, duty] =
+            [sample.current_raw, sample.bus_raw, sample.duty_raw.cast_unsigned()].map(u64::from);
+        let supply = current | bus << 16 | duty << 32;
         for word in [
             u64::from(tick),
             pair(encoder_count_raw[0], encoder_count_raw[1]),
             f1 | f2 << 16 | f3 << 32 | f4 << 48,
-            pair(reference_raw, sample.command_raw),
-            u64::from(current_raw) | u64::from(duty_raw.cast_unsigned()) << 16,
+            pair(reference_raw, command_raw),
+            supply | u64::from(sample.limits.0) << 48,
+            sample.state as u64,
         ] {
             // FNV-1a by words: the order counts, and one bit that differs changes the rest.
             self.digest = (self.digest ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);

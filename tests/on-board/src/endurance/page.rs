@@ -71,7 +71,7 @@ pub fn native(run: &NativeRun, span: &str, provenance: &str) -> String {
         run.ticks,
         run.borders,
         run.tick_ns,
-        table(&run.checks)
+        table(&run.all_checks())
     );
     for (number, (span, kib)) in (1..).zip(run.spans.iter().zip(&run.memory_kib)) {
         let _ = writeln!(text, "| {number} | {} | {kib} |", errors(span));
@@ -86,7 +86,7 @@ pub fn emulated(run: &EmulatedRun, span: &str, provenance: &str) -> String {
          | {span} | RMS, mrad | mean, mrad | largest, mrad | longest tick, us | mean tick, us | jitter, us | stack, bytes | memory of \
          the host, KiB |\n|---|---|---|---|---|---|---|---|---|\n",
         run.samples,
-        table(&run.checks)
+        table(&run.all_checks())
     );
     let us = |cycles: f64| cycles / CYCLES_PER_US;
     for (number, (span, upkeep)) in (1..).zip(run.spans.iter().zip(&run.upkeep)) {
