@@ -113,7 +113,7 @@ fn endure(options: &Options) -> Outcome {
     if *native_hours > 0.0 {
         let begun = Instant::now();
         let run = native::run(&native::Plan::WRAP, &mut |number, span| {
-            println!("{}", error_line("40 s", number, span))
+            println!("{}", error_line("40 s", number, span));
         })?;
         print("counters at their ends, natively", &run.all_checks(), begun, &mut failed);
         let wrap = page::native(&run, "40 s", provenance);
@@ -122,7 +122,9 @@ fn endure(options: &Options) -> Outcome {
         let plan = native::Plan::hours(*native_hours);
         let name = if plan.parts == native::PARTS_AN_HOUR { "hour" } else { "quarter" };
         let begun = Instant::now();
-        let run = native::run(&plan, &mut |number, span| println!("{}", error_line(name, number, span)))?;
+        let run = native::run(&plan, &mut |number, span| {
+            println!("{}", error_line(name, number, span));
+        })?;
         print(&format!("{native_hours} h natively"), &run.all_checks(), begun, &mut failed);
         let native = page::native(&run, name, provenance);
         put(page.as_deref(), |sections| sections.native = Some(native))?;

@@ -27,12 +27,20 @@ impl Check {
     }
 
     /// A number that has to be this one.
-    pub fn equal<T: PartialEq + std::fmt::Display>(what: impl Into<String>, value: T, expected: T) -> Self {
+    pub fn equal<T: PartialEq + std::fmt::Display + Copy>(
+        what: impl Into<String>,
+        value: T,
+        expected: T,
+    ) -> Self {
         Self::new(what, value.to_string(), expected.to_string(), value == expected)
     }
 
     /// A number that must not be larger.
-    pub fn at_most<T: PartialOrd + std::fmt::Display>(what: impl Into<String>, value: T, most: T) -> Self {
+    pub fn at_most<T: PartialOrd + std::fmt::Display + Copy>(
+        what: impl Into<String>,
+        value: T,
+        most: T,
+    ) -> Self {
         Self::new(what, value.to_string(), format!("at most {most}"), value <= most)
     }
 }

@@ -106,8 +106,8 @@ impl CoarseJoint {
 
     fn read_encoders(&mut self) {
         self.sequence = self.sequence.wrapping_add(1);
-        for which in 0..2 {
-            let counts = (self.theta_rad[which] / TAU * COUNTS_PER_TURN + ZEROS_COUNTS[which]).round() as i64;
+        for (which, zero_counts) in ZEROS_COUNTS.into_iter().enumerate() {
+            let counts = (self.theta_rad[which] / TAU * COUNTS_PER_TURN + zero_counts).round() as i64;
             self.counts[which] = counts;
             let frame_raw = amt22((counts & 0xfff) as u32);
             self.words[which] = EncoderWord { frame_raw, sequence: self.sequence, bus_error: false };

@@ -60,7 +60,9 @@ mod tests {
         let sample = |n: u32| Sample { duty_raw: n as i16, ..Sample::default() };
         let ledger = |ticks: &[u32]| {
             let mut ledger = Ledger::default();
-            ticks.iter().for_each(|tick| ledger.take(*tick, &sample(*tick)));
+            for tick in ticks {
+                ledger.take(*tick, &sample(*tick));
+            }
             ledger
         };
         // The count of ticks wraps.

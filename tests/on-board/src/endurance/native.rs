@@ -205,7 +205,7 @@ struct Wire(Rc<RefCell<Line>>);
 
 /// Frames that end in these bytes.
 fn frames(bytes: &[u8]) -> u64 {
-    bytes.iter().filter(|byte| **byte == 0).count() as u64
+    bytes.split(|byte| *byte == 0).count() as u64 - 1
 }
 
 impl Transport for Wire {
@@ -245,7 +245,7 @@ struct Counted {
 impl Counted {
     fn of(line: &Line, start: &Counters) -> Self {
         let now = line.board.now();
-        let passed_ns = (now - start.now).as_nanos() as u64;
+        let passed_ns = now.saturating_sub(start.now).as_nanos() as u64;
         Self {
             ticks: u64::from(start.ticks) + passed_ns / (1_000_000_000 / RATE_HZ),
             milliseconds: now.as_millis() as u64,
