@@ -128,7 +128,7 @@ pub struct Service {
     telemetry: TelemetryMode,
     heard_ms: u32,
     bad_frames: u32,
-    /// Number of the request whose reference points were taken last.
+    /// Number of the request whose reference points were taken last, unless a request of another kind came behind it.
     streamed: Option<u16>,
     /// Reference that waits for the next run.
     waiting: Option<Reference>,
@@ -208,6 +208,11 @@ impl Service {
         if self.identity.chip.is_safe() && !answered_in_safe_mode(&request.message) {
             return Reply::Say(FromBoard::Refused(Refusal::SafeMode));
         }
+        if !matches!(request.message, ToBoard::StreamPoints(_)) {
+            // Points are not repeated behind another request, and their number comes again: 65 536 requests later, or when another
+            // program counts anew.
+            self.streamed = None;
+        }
         let answer = match &request.message {
             ToBoard::StoreParameters => {
                 // Erasing masks all interrupts below the tick's, so encoders are not read meanwhile.
@@ -217,11 +222,7 @@ impl Service {
                 }
                 Err(Refusal::WrongState(state))
             }
-            ToBoard::Hello => {
-                // Another program counts its requests anew.
-                self.streamed = None;
-                Ok(self.greeting())
-            }
+            ToBoard::Hello => Ok(self.greeting()),
             ToBoard::Alive => Ok(FromBoard::Done),
             ToBoard::ReadParameter(index) => self.parameter(*index),
             ToBoard::WriteParameter { index, value } => self.write(*index, *value, port),

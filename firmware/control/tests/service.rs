@@ -240,6 +240,19 @@ fn a_repeated_request_appends_its_points_once() {
 }
 
 #[test]
+fn points_under_a_number_that_was_used_long_ago_are_appended() {
+    let (mut service, mut tick) = (service(), tick_in(State::Run));
+    let points = || ToBoard::StreamPoints([0.5].into_iter().collect());
+    asked(&mut service, &mut tick, 7, points());
+    // The numbers of requests wrap.
+    for sequence in (8..=u16::MAX).chain(0..7) {
+        asked(&mut service, &mut tick, sequence, ToBoard::Alive);
+    }
+    asked(&mut service, &mut tick, 7, points());
+    assert_eq!(tick.points, [1 << 19, 1 << 19]);
+}
+
+#[test]
 fn a_silent_host_stops_a_joint_that_moves() {
     let (mut service, mut tick) = (service(), tick_in(State::Run));
     let limit_ms = (service.parameters().host_timeout_s() * 1e3) as u32;

@@ -38,6 +38,10 @@ const ENTRIES: u32 = 4;
 /// How long an answer is waited for in all, if the caller does not say.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(1500);
 
+/// Board time around an absence that is not counted as such, at most: from the last sample to the break, and until the board has told
+/// its count.
+const UNSEEN: Duration = Duration::from_secs(1);
+
 /// Bytes that one read takes at most.
 const READ_LENGTH: usize = 4096;
 
@@ -219,16 +223,25 @@ impl Client {
         let status = self.status()?;
         let period_ns = u64::from(status.period_ns.max(1));
         let expected = before.wire.losses.next_tick();
-        let went_back =
-            expected.is_some_and(|expected| status.tick.wrapping_sub(expected as u32) > u32::MAX / 2);
+        let passed = expected.map(|expected| status.tick.wrapping_sub(expected as u32));
+        let went_back = passed.is_some_and(|passed| passed > u32::MAX / 2);
+        let gap = away.as_nanos() as u64 / period_ns;
+        let most = gap + UNSEEN.as_nanos() as u64 / period_ns;
+        let may_have_wrapped =
+            expected.is_some_and(|expected| u64::from(expected as u32) + most > u64::from(u32::MAX));
+        let is_young = if may_have_wrapped {
+            // A low count says nothing; the ticks since the last sample do. Both clocks are good to a thousandth.
+            passed.is_some_and(|passed| !(gap - gap / 1000..=most + gap / 1000).contains(&u64::from(passed)))
+        } else {
+            u64::from(status.tick) <= gap
+        };
         // A board that is younger than the gap was not there before it.
-        let restarted = went_back || Duration::from_nanos(u64::from(status.tick) * period_ns) <= away;
+        let restarted = went_back || is_young;
         self.wire.hub.clone_from(&before.wire.hub);
         self.wire.heard_bytes += before.wire.heard_bytes;
         self.wire.losses = before.wire.losses.carried(restarted);
         self.wire.tick_offset = before.wire.tick_offset;
         if restarted {
-            let gap = away.as_nanos() as u64 / period_ns;
             let since_start = gap.saturating_sub(status.tick.into());
             self.wire.tick_offset += expected.unwrap_or(0) + since_start;
         }

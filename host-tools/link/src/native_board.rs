@@ -139,6 +139,19 @@ impl<T: Copy> NativeBoard<T> {
         }
     }
 
+    /// The same after a long time in service: `ticks` were done and `now` has passed since it was switched on. For what happens where
+    /// the counters wrap: that of ticks at 2³², that of milliseconds at 49.7 days.
+    ///
+    /// # Panics
+    /// Never: as [`NativeBoard::new`].
+    #[must_use]
+    pub fn in_service(self, ticks: u32, now: Duration) -> Self {
+        let config = tick_config(&Parameters::default()).expect("default parameters fit together");
+        let controller = Controller::resumed(config, None, ticks, [None; 2]);
+        let now_ns = now.as_nanos() as u64;
+        Self { controller, now_ns, supervised_ns: now_ns, ..self }
+    }
+
     /// The control.
     pub fn controller(&self) -> &Controller {
         &self.controller

@@ -328,7 +328,8 @@ impl Session {
             while let Some(telemetry) = self.client.telemetry() {
                 heard = self.client.now();
                 last_tick = telemetry.batch.first_tick;
-                for tick in telemetry.ticks() {
+                // As the board counts them: a start of the board that is counted through is not in there.
+                for (place, tick) in (0..).zip(telemetry.ticks()) {
                     let state = tick.sample.state;
                     let running = state == State::Run;
                     if running && !begun {
@@ -338,7 +339,7 @@ impl Session {
                         }
                     }
                     if !begun {
-                        let waited = (tick.tick as u32).wrapping_sub(asked.tick);
+                        let waited = last_tick.wrapping_add(place).wrapping_sub(asked.tick);
                         if waited > SETTLED_TICKS && waited < u32::MAX / 2 {
                             return self.left(state);
                         }

@@ -15,15 +15,19 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
+use bowden_control::parameters::Parameters;
+
 use super::error::CommsError;
 use super::transport::Transport;
-use board::SimBoard;
+use joint::SimJoint;
+
+pub use board::{Joint, SimBoard};
 pub use concealed::Concealed;
 pub use hand::SimHand;
 
 /// A simulated board at the other end.
 pub struct SimTransport {
-    board: Rc<RefCell<SimBoard>>,
+    board: Rc<RefCell<SimBoard<SimJoint>>>,
 }
 
 impl SimTransport {
@@ -41,12 +45,12 @@ impl SimTransport {
     /// # Errors
     /// [`CommsError::Open`], when such a bench cannot be simulated.
     pub fn with(concealed: &Concealed) -> Result<Self, CommsError> {
-        let board = SimBoard::new(concealed).map_err(|error| CommsError::Open {
+        let joint = SimJoint::new(&Parameters::default(), concealed).map_err(|error| CommsError::Open {
             port: super::SIM.to_owned(),
             reason: error.to_string(),
             next: "conceal something else".into(),
         })?;
-        Ok(Self { board: Rc::new(RefCell::new(board)) })
+        Ok(Self { board: Rc::new(RefCell::new(SimBoard::new(joint))) })
     }
 
     /// A hand at its bench.

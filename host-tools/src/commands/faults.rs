@@ -192,14 +192,21 @@ fn save_snapshot(client: &mut Client, status: &Status, path: &Path) -> Result<Op
     let format = Format::for_rows(path)?;
     let parameters = ParameterSet::read(client)?;
     let conversion = Conversion::new(&parameters)?;
-    let mut samples: Vec<(u32, Sample)> = Vec::with_capacity(status.snapshot.into());
+    let mut samples: Vec<(u64, Sample)> = Vec::with_capacity(status.snapshot.into());
     for index in 0..status.snapshot {
         // While no fault holds them, the oldest are overwritten as they are read.
         match client.snapshot(index) {
-            Ok((tick, sample)) if samples.last().is_none_or(|(before, _)| *before < tick) => {
-                samples.push((tick, sample));
-            }
-            Ok(_) | Err(LinkError::Refused { refusal: Refusal::NoSuchIndex, .. }) => {}
+            Ok((tick, sample)) => match samples.last() {
+                None => samples.push((tick.into(), sample)),
+                Some((before, _)) => {
+                    // The board's count wraps; that of the file goes on.
+                    let later = tick.wrapping_sub(*before as u32);
+                    if (1..u32::MAX / 2).contains(&later) {
+                        samples.push((before + u64::from(later), sample));
+                    }
+                }
+            },
+            Err(LinkError::Refused { refusal: Refusal::NoSuchIndex, .. }) => {}
             Err(error) => return Err(error.into()),
         }
     }
@@ -212,7 +219,7 @@ fn save_snapshot(client: &mut Client, status: &Status, path: &Path) -> Result<Op
     output::write_file(path, |file| {
         let mut writer = RowWriter::new(format, &columns(None), &Metadata::default(), file)?;
         for (tick, sample) in &samples {
-            let t_s = tick_time_s((*tick).into(), status.period_ns);
+            let t_s = tick_time_s(*tick, status.period_ns);
             writer.row(t_s, conversion.cells(sample, None))?;
         }
         writer.finish(&Metadata::default())

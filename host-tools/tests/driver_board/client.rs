@@ -8,7 +8,7 @@ use bowden_link::{SCHEMA, State, ToBoard};
 
 use crate::fake::Fake;
 use crate::mishaps::Mishaps;
-use crate::wires::{TIMEOUT, connect};
+use crate::wires::{TIMEOUT, connect, connect_again};
 
 fn message(error: &LinkError) -> String {
     error.to_string()
@@ -225,6 +225,37 @@ fn telemetry_comes_in_order_with_its_gaps_counted() {
     assert!(losses.late_batches >= 15, "{losses:?}");
     assert!(losses.damaged_frames >= 12, "{losses:?}");
     assert_eq!(fake.borrow().violations, [""; 0]);
+}
+
+#[test]
+fn a_count_that_wraps_while_the_board_is_away_is_no_restart() {
+    let away = Duration::from_secs(3);
+    // Not at all, at once, and late.
+    for restart_after in [None, Some(Duration::from_millis(100)), Some(Duration::from_millis(2500))] {
+        let mut fake = Fake::new(Mishaps::default());
+        fake.tick = u32::MAX - 20_000;
+        let (before, fake) = connect(fake);
+        let mut before = before.unwrap();
+        before.switch_telemetry(true).unwrap();
+        while before.telemetry().is_none() {
+            before.listen(Duration::from_millis(5)).unwrap();
+        }
+        let now = before.now();
+        if let Some(after) = restart_after {
+            fake.borrow_mut().advance_to(now + after);
+            fake.borrow_mut().switch_off_and_on();
+        }
+        fake.borrow_mut().advance_to(now + away);
+        assert!(fake.borrow().tick < 30_000, "wrapped or anew");
+        let mut client = connect_again(&fake).unwrap();
+        assert_eq!(client.continue_from(&before, away), Ok(restart_after.is_some()));
+        // The count goes on either way.
+        client.switch_telemetry(true).unwrap();
+        client.listen(Duration::from_millis(5)).unwrap();
+        let first_tick = client.telemetry().unwrap().first_tick;
+        let expected = u64::from(u32::MAX) - 20_000 + 30_000;
+        assert!((expected..expected + 1000).contains(&first_tick), "{first_tick}, expected {expected}");
+    }
 }
 
 #[test]

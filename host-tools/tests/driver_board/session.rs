@@ -2,15 +2,17 @@
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 use bowden_host_link::course::{Course, Track};
+use bowden_host_link::hub::Hub;
 use bowden_host_link::{CommsError, LinkError, RunEnd, Session};
 use bowden_link::message::{Goal, Mode, Reference, Shape};
 use bowden_link::{Fault, State, ToBoard};
 
 use crate::fake::Fake;
 use crate::mishaps::Mishaps;
-use crate::wires::connect;
+use crate::wires::{connect, connect_again};
 
 const SINE: Reference =
     Reference::Generated { shape: Shape::Sine, amplitude: 0.3, offset: 0.0, frequency_hz: 0.5 };
@@ -41,6 +43,27 @@ fn a_run_gives_every_tick_once_and_ends_with_the_bridge_off() {
     assert_eq!(fake.count(|message| *message == ToBoard::SetReference(SINE)), 1);
     assert_eq!(fake.carried_out.last(), Some(&ToBoard::Telemetry(false)));
     assert_eq!(fake.violations, [""; 0]);
+}
+
+#[test]
+fn a_board_that_started_again_runs_as_before() {
+    let (client, fake) = connect(Fake::new(Mishaps::default()));
+    let mut session = Session::new(client.unwrap()).unwrap();
+    session.watch(Hub::default()).unwrap();
+    while session.client().losses().next_tick().is_none() {
+        session.idle(Duration::from_millis(5)).unwrap();
+    }
+    let now = session.client().now();
+    fake.borrow_mut().switch_off_and_on();
+    fake.borrow_mut().advance_to(now + Duration::from_secs(1));
+    assert_eq!(session.adopt(connect_again(&fake).unwrap(), Duration::from_secs(2)), Ok(true));
+    session.ready(&never).unwrap();
+    let mut count = 0;
+    let end = session.run(Mode::Position, &Course::OnBoard(SINE), &never, &mut |_| {
+        count += 1;
+        if count == 5000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!((end, count), (Ok(RunEnd::Complete), 5000));
 }
 
 #[test]

@@ -167,6 +167,22 @@ fn a_fault_during_the_run_is_reported_and_keeps_the_recording() {
 }
 
 #[test]
+fn the_ticks_before_a_fault_are_kept_where_their_count_wraps() {
+    let mut fake = Fake::new(Mishaps::default());
+    fake.tick = u32::MAX - 40;
+    fake.advance_to(Duration::from_micros(6400));
+    fake.state = State::Fault;
+    let terminal = Terminal::new(fake);
+    let folder = tempfile::tempdir().unwrap();
+    let (status, _, stderr) = terminal.bowden(folder.path(), "faults", &["--snapshot", "s.csv"]);
+    assert_eq!((status, stderr.as_str()), (0, ""));
+    let snapshot = load(folder.path(), "s.csv");
+    let ticks: Vec<u64> = snapshot.t_s().iter().map(|t_s| (t_s * 1e4).round() as u64).collect();
+    let first = u64::from(u32::MAX) - 39;
+    assert_eq!(ticks, (first..first + 64).collect::<Vec<_>>());
+}
+
+#[test]
 fn a_reference_that_the_joint_cannot_do_is_not_even_sent() {
     let terminal = Terminal::new(Fake::new(Mishaps::default()));
     let folder = tempfile::tempdir().unwrap();

@@ -8,6 +8,7 @@ mod core_from_source;
 mod cross_target;
 mod debian;
 mod demo;
+mod endure;
 mod faults;
 mod files;
 mod firmware;
@@ -56,6 +57,9 @@ enum Task {
     /// Break one or two things at a time on the emulated board, judge what the release image makes of it, and write
     /// tests/docs/faults.md; `faults --help` lists options
     Faults(faults::Options),
+    /// Drive the joint for a day natively and for ten minutes on the emulated board, check that nothing drifts, grows or gets lost, and
+    /// write tests/docs/endurance.md; `endure --help` lists options
+    Endure(endure::Options),
     /// Build the release images for the driver board and print what they take of its memory
     Firmware,
     /// Run clippy on everything, the board's images among it; warnings are errors
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
         Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),
         Ok(Cli { task: Task::Fuzz(options) }) => fuzz::run(&options),
         Ok(Cli { task: Task::Faults(options) }) => faults::run(&options),
+        Ok(Cli { task: Task::Endure(options) }) => endure::run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
         Ok(Cli { task: Task::Clippy }) => clippy::run(),
         Err(error) => return usage(&error),
@@ -100,7 +105,7 @@ fn usage(error: &clap::Error) -> ExitCode {
         .collect();
     let what = what.join(" ");
     eprintln!(
-        "xtask: {}; the tasks are demo, test, bench, prove, paper, fuzz, faults, firmware and clippy, see `cargo xtask --help`",
+        "xtask: {}; the tasks are demo, test, bench, prove, paper, fuzz, faults, endure, firmware and clippy, see `cargo xtask --help`",
         what.strip_prefix("error: ").unwrap_or(&what)
     );
     ExitCode::from(2)

@@ -20,26 +20,31 @@ const LOOK_S: f64 = 1e-3;
 
 /// Lets `seconds` pass with telemetry on and compares; the samples are taken out of the telemetry.
 pub fn follow_truth(host: &mut Host, seconds: f64) -> Outcome<LoopError> {
-    let mut truth = Vec::new();
+    let errors_rad = errors_rad(host, seconds)?;
+    let squares: f64 = errors_rad.iter().map(|error_rad| error_rad * error_rad).sum();
+    let largest_rad = errors_rad.iter().fold(0.0_f64, |largest, error_rad| largest.max(error_rad.abs()));
+    let rms_rad = (squares / errors_rad.len().max(1) as f64).sqrt();
+    Ok(LoopError { rms_rad, largest_rad, looks: errors_rad.len() })
+}
+
+/// Board time behind the last look of [`errors_rad`], for what is still on its way \[s\].
+pub const ARRIVAL_S: f64 = 20.0 * LOOK_S;
+
+/// The errors of all looks at the truth in `seconds`, with telemetry on, and [`ARRIVAL_S`] without a look; the samples are taken out
+/// of the telemetry.
+pub fn errors_rad(host: &mut Host, seconds: f64) -> Outcome<Vec<f64>> {
     let looks = (seconds / LOOK_S).round() as usize;
+    let mut truth = Vec::with_capacity(looks);
     for _ in 0..looks {
         host.run(LOOK_S)?;
         // The tick that began last is the newest one with a reference.
         truth.push((host.ticks.begun.wrapping_sub(1), host.board.bench().theta_out_rad()));
     }
-    // What is still on its way.
-    host.run(20.0 * LOOK_S)?;
+    host.run(ARRIVAL_S)?;
     let samples = host.telemetry.take();
-    let (mut squares, mut largest, mut found) = (0.0, 0.0_f64, 0);
-    for (tick, angle_rad) in truth {
-        if let Ok(at) = samples.binary_search_by_key(&tick, |(tick, _)| *tick) {
-            let reference_rad = f64::from(samples[at].1.reference_raw) / STEPS_PER_UNIT;
-            let error_rad = angle_rad - reference_rad;
-            squares += error_rad * error_rad;
-            largest = largest.max(error_rad.abs());
-            found += 1;
-        }
-    }
-    let rms_rad = (squares / f64::from(found.max(1))).sqrt();
-    Ok(LoopError { rms_rad, largest_rad: largest, looks: found as usize })
+    let error_rad = |(tick, angle_rad): (u32, f64)| {
+        let at = samples.binary_search_by_key(&tick, |(tick, _)| *tick).ok()?;
+        Some(angle_rad - f64::from(samples[at].1.reference_raw) / STEPS_PER_UNIT)
+    };
+    Ok(truth.into_iter().filter_map(error_rad).collect())
 }

@@ -11,6 +11,7 @@ pub mod campaign;
 pub mod corrections;
 pub mod cost;
 pub mod course;
+pub mod endurance;
 pub mod host;
 pub mod image;
 pub mod load;

@@ -3,42 +3,43 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use bowden_control::parameters::Parameters;
 use bowden_control::service::{Batcher, RawBatcher, Reply, Service, TelemetryMode};
 use bowden_control::tick::{EncoderWord, TickInput, TickOutput};
 use bowden_link::frame::{Accumulator, FRAME_LENGTH, encode};
 use bowden_link::message::Refusal;
 use bowden_link::sample::{Order, WordRaw};
 use bowden_link::{Answer, FromBoard, Inputs, RawTick, Request};
-use virtual_bench::{BenchError, LiveBench};
 
-use super::concealed::Concealed;
-use super::joint::SimJoint;
 use crate::native_board::NativeBoard;
 
 /// Duty 1.
 const FULL_DUTY: f64 = 32_767.0;
 
+/// What stands behind the converters and the bridge of a simulated board.
+pub trait Joint {
+    /// What the hardware has measured for the tick that begins now. Encoders were read since the tick before.
+    fn measure(&mut self) -> TickInput;
+
+    /// Moves the joint on by `period_s`, a multiple of the PWM's, then sets the bridge as the tick asks.
+    fn advance(&mut self, duty: f64, bridge_on: bool, period_s: f64);
+}
+
 /// The board.
-pub(super) struct SimBoard {
+pub struct SimBoard<J> {
     /// Orders are told by what raw telemetry names them by.
     board: NativeBoard<Order>,
     batcher: Batcher,
     raw: RawBatcher,
-    joint: SimJoint,
+    joint: J,
     incoming: Accumulator<FRAME_LENGTH>,
     outgoing: VecDeque<u8>,
     next_frame: u16,
 }
 
-impl SimBoard {
+impl<J: Joint> SimBoard<J> {
     /// A board that has just been switched on.
-    ///
-    /// # Errors
-    /// When the bench cannot be simulated.
-    pub(super) fn new(concealed: &Concealed) -> Result<Self, BenchError> {
-        let joint = SimJoint::new(&Parameters::default(), concealed)?;
-        Ok(Self {
+    pub fn new(joint: J) -> Self {
+        Self {
             board: NativeBoard::new(env!("CARGO_PKG_VERSION"), "simulated"),
             batcher: Batcher::default(),
             raw: RawBatcher::default(),
@@ -46,26 +47,37 @@ impl SimBoard {
             incoming: Accumulator::default(),
             outgoing: VecDeque::new(),
             next_frame: 0,
-        })
+        }
+    }
+
+    /// The same after a long time in service, see [`NativeBoard::in_service`]; its next frame has the number `frame`.
+    #[must_use]
+    pub fn in_service(self, ticks: u32, now: Duration, frame: u16) -> Self {
+        Self { board: self.board.in_service(ticks, now), next_frame: frame, ..self }
     }
 
     /// Time since it was switched on.
-    pub(super) fn now(&self) -> Duration {
+    pub fn now(&self) -> Duration {
         self.board.now()
     }
 
-    /// The bench behind its sensors, for a hand.
-    pub(super) fn bench(&mut self) -> &mut LiveBench {
-        self.joint.bench()
+    /// Control ticks done, as the board counts them.
+    pub fn tick_count(&self) -> u32 {
+        self.board.controller().tick_count()
+    }
+
+    /// The joint.
+    pub fn joint(&mut self) -> &mut J {
+        &mut self.joint
     }
 
     /// Whether there is nothing to send.
-    pub(super) fn is_silent(&self) -> bool {
+    pub fn is_silent(&self) -> bool {
         self.outgoing.is_empty()
     }
 
     /// Sends what there is and fits.
-    pub(super) fn send_into(&mut self, buffer: &mut [u8]) -> usize {
+    pub fn send_into(&mut self, buffer: &mut [u8]) -> usize {
         let length = buffer.len().min(self.outgoing.len());
         for (place, byte) in buffer.iter_mut().zip(self.outgoing.drain(..length)) {
             *place = byte;
@@ -74,7 +86,7 @@ impl SimBoard {
     }
 
     /// One control tick, and the joint up to the next one.
-    pub(super) fn tick(&mut self) {
+    pub fn tick(&mut self) -> TickOutput {
         let input = self.joint.measure();
         let tick = self.board.controller().tick_count();
         let output = self.board.tick(&input);
@@ -83,6 +95,7 @@ impl SimBoard {
         let duty = f64::from(output.duty_raw) / FULL_DUTY;
         self.joint.advance(duty, output.bridge_on, period_ns as f64 * 1e-9);
         self.board.pass(Order::Stop);
+        output
     }
 
     /// Adds a tick to the telemetry that is wanted. A batch that was begun for a host that does not want it any more is dropped.
@@ -119,7 +132,7 @@ impl SimBoard {
     }
 
     /// Takes bytes of the host and answers the requests that they complete.
-    pub(super) fn receive(&mut self, bytes: &[u8]) {
+    pub fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
             match self.incoming.push::<Request>(*byte) {
                 None => {}

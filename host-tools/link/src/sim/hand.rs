@@ -6,6 +6,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use super::board::SimBoard;
+use super::joint::SimJoint;
 use crate::calibrate::hand::{Act, Hand};
 
 /// Standard gravity of the bench, m/s².
@@ -19,14 +20,14 @@ const TURN_RAD: f64 = 0.6;
 
 /// A hand at the bench of a simulated board.
 pub struct SimHand {
-    board: Rc<RefCell<SimBoard>>,
+    board: Rc<RefCell<SimBoard<SimJoint>>>,
     /// It took the tendons off, and so keeps the arm from swinging.
     tendons_off: bool,
 }
 
 impl SimHand {
     /// A hand at the bench of this board.
-    pub(super) fn new(board: Rc<RefCell<SimBoard>>) -> Self {
+    pub(super) fn new(board: Rc<RefCell<SimBoard<SimJoint>>>) -> Self {
         Self { board, tendons_off: false }
     }
 }
@@ -34,7 +35,7 @@ impl SimHand {
 impl Hand for SimHand {
     fn act(&mut self, act: Act) {
         let mut board = self.board.borrow_mut();
-        let bench = board.bench();
+        let bench = board.joint().bench();
         let load = |cell: usize, load_n: f64| {
             let mut loads_n = [0.0; 4];
             loads_n[cell] = load_n;

@@ -9,6 +9,7 @@ use bowden_control::parameters::Parameters;
 use bowden_control::tick::{EncoderWord, TickInput};
 use virtual_bench::{BenchError, Bridge, Channel, LiveBench};
 
+use super::board::Joint;
 use super::concealed::Concealed;
 use super::wiring::Wiring;
 
@@ -43,7 +44,7 @@ fn code_of(volts: f64) -> u16 {
 }
 
 /// A joint and the sensors on it.
-pub(super) struct SimJoint {
+pub struct SimJoint {
     bench: LiveBench,
     bridge: Bridge,
     zeros: [f64; 2],
@@ -71,39 +72,6 @@ impl SimJoint {
         Ok(joint)
     }
 
-    /// What the hardware has measured for the tick that begins now. Encoders were read since the tick before.
-    pub(super) fn measure(&mut self) -> TickInput {
-        let encoder = self.frames.map(|frame_raw| EncoderWord {
-            frame_raw,
-            sequence: self.encoder_sequence,
-            bus_error: false,
-        });
-        let tensions = [Channel::F1, Channel::F2, Channel::F3, Channel::F4];
-        let sensed_n = tensions.map(|channel| self.bench.sensed(channel));
-        let tension_raw =
-            self.wiring.cell.map(|cell| cell.map_or(code_of(BROKEN_V), |cell| TENSION.code(sensed_n[cell])));
-        // The shunt is in the bridge's line to the motor: it sees the leads as the bridge does.
-        let sign = if self.wiring.motor_reversed { -1.0 } else { 1.0 };
-        let current_raw = CURRENT.code(sign * self.bench.sensed(Channel::Current));
-        let bus_raw = BUS.code(self.bench.supply_v());
-        // The transfer started by this tick is done long before the next one.
-        self.read_encoders();
-        TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault: false }
-    }
-
-    /// Moves the joint on by `period_s`, a multiple of the PWM's, then sets the bridge as the tick asks.
-    pub(super) fn advance(&mut self, duty: f64, bridge_on: bool, period_s: f64) {
-        let at_motor = match self.bridge {
-            Bridge::Duty(duty) if self.wiring.motor_reversed => Bridge::Duty(-duty),
-            other => other,
-        };
-        let steps = (period_s / self.bench.config().step_s).round().max(1.0);
-        for _ in 0..steps as usize {
-            self.bench.step(at_motor);
-        }
-        self.bridge = if bridge_on { Bridge::Duty(duty) } else { Bridge::Open };
-    }
-
     /// The bench, for a hand.
     pub(super) fn bench(&mut self) -> &mut LiveBench {
         &mut self.bench
@@ -124,6 +92,39 @@ impl SimJoint {
             *frame = amt22_frame(count as u16).into();
         }
         self.encoder_sequence = self.encoder_sequence.wrapping_add(1);
+    }
+}
+
+impl Joint for SimJoint {
+    fn measure(&mut self) -> TickInput {
+        let encoder = self.frames.map(|frame_raw| EncoderWord {
+            frame_raw,
+            sequence: self.encoder_sequence,
+            bus_error: false,
+        });
+        let tensions = [Channel::F1, Channel::F2, Channel::F3, Channel::F4];
+        let sensed_n = tensions.map(|channel| self.bench.sensed(channel));
+        let tension_raw =
+            self.wiring.cell.map(|cell| cell.map_or(code_of(BROKEN_V), |cell| TENSION.code(sensed_n[cell])));
+        // The shunt is in the bridge's line to the motor: it sees the leads as the bridge does.
+        let sign = if self.wiring.motor_reversed { -1.0 } else { 1.0 };
+        let current_raw = CURRENT.code(sign * self.bench.sensed(Channel::Current));
+        let bus_raw = BUS.code(self.bench.supply_v());
+        // The transfer started by this tick is done long before the next one.
+        self.read_encoders();
+        TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault: false }
+    }
+
+    fn advance(&mut self, duty: f64, bridge_on: bool, period_s: f64) {
+        let at_motor = match self.bridge {
+            Bridge::Duty(duty) if self.wiring.motor_reversed => Bridge::Duty(-duty),
+            other => other,
+        };
+        let steps = (period_s / self.bench.config().step_s).round().max(1.0);
+        for _ in 0..steps as usize {
+            self.bench.step(at_motor);
+        }
+        self.bridge = if bridge_on { Bridge::Duty(duty) } else { Bridge::Open };
     }
 }
 

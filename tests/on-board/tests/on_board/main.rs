@@ -12,6 +12,7 @@ mod corrections;
 mod coverage;
 mod determinism;
 mod directions;
+mod endurance;
 mod facts;
 mod failures;
 mod faults;
