@@ -300,7 +300,7 @@ mod tests {
             code[at..at + 4].copy_from_slice(&word.to_le_bytes());
             check_vectors(&[Run { address: FLASH_START, bytes: code }])
         };
-        assert_eq!(check(0, 0x2000_8800), Ok(()));
+        assert_eq!(check(0, 0x2000_8c00), Ok(()));
         for (at, word) in [(0, 0x2002_0004), (0, 0xffff_ffff), (4, 0x0800_0008), (4, 0x0800_0011)] {
             assert!(matches!(check(at, word), Err(Problem::Vectors(_))), "{at} {word:#x}");
         }

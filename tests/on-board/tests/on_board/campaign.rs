@@ -48,7 +48,7 @@ fn the_judgement_tells_found_harmless_silent_and_absent_faults_apart() -> Outcom
     let mut cases: Vec<Case> = [
         "encoder-silent/fast/1",
         "host-not-reading/fast/1",
-        "tension-swapped/fast/1001",
+        "bus-reading/start/1001",
         "reset/fast/1",
         "motor-lead/fast/3",
     ]
