@@ -268,7 +268,7 @@ mod tests {
     fn a_channel_that_begins_to_read_more_is_no_exchange() {
         let (mut watch, config) = (ChannelOrder::default(), config(Fitted::All));
         for n in 0..400 {
-            let phase_rad = n as f64 * core::f64::consts::TAU / 100.0;
+            let phase_rad = f64::from(n) * core::f64::consts::TAU / 100.0;
             let (angle_rad, sign) = (0.3 * libm::sin(phase_rad), libm::cos(phase_rad).signum());
             let more_n = if n < 40 { 0.0 } else { 36.0 };
             let read = [30.0 + 5.5 * sign + more_n, 30.0 - 5.5 * sign, 30.0 - 5.5 * sign, 30.0 + 5.5 * sign]
