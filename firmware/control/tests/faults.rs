@@ -255,7 +255,8 @@ fn swapped_tension_channels_are_found() {
             bench.refer(Reference::Generated { shape, amplitude: 0.3, offset: 0.0, frequency_hz });
             bench.order(Goal::Run(Mode::Position));
             bench.disturbance = Some(swap);
-            let (ticks, record) = trip(&mut bench, 60_000);
+            // Behind the second turn: 6 s into the triangle of 8 s.
+            let (ticks, record) = trip(&mut bench, 80_000);
             println!("{shape:?}, {frequency_hz} Hz: {record}, {ticks} ticks");
             let is_stretch = record.fault == Fault::StretchInconsistent;
             assert!(is_stretch || (record.fault, record.channel) == (Fault::TensionSwapped, end), "{record}");
