@@ -24,6 +24,8 @@ use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Ch2};
 
+use crate::clock::CYCLES_PER_US;
+
 type High<C> = PwmPin<'static, TIM1, C>;
 type Low<C> = ComplementaryPwmPin<'static, TIM1, C>;
 
@@ -46,11 +48,11 @@ const BREAK_FILTER: FilterValue = FilterValue::FDTS_DIV8_N8;
 /// Level of the voltage detector: 2.9 V where 3.3 V should be (RM0440, `PWR_CR2`).
 const SUPPLY_LEVEL: u8 = 6;
 
-/// Time behind a stop in which the fault line is watched: 1 ms, far above the 56 us for which a DRV8305 pulls it low to warn.
-const LISTENED_CYCLES: u32 = 170_000;
+/// Time behind a stop in which the fault line is watched \[ms\]: far above the tens of microseconds for which a driver pulls it low to warn.
+pub const LISTENED_MS: u32 = 1;
 
 /// Core cycles a millisecond.
-const CYCLES_A_MS: f32 = 170_000.0;
+const CYCLES_A_MS: u32 = 1000 * CYCLES_PER_US;
 
 /// The bridge, off after [`Self::new`].
 pub struct Bridge {
@@ -133,12 +135,9 @@ impl Bridge {
     pub fn let_go_ms(&mut self) -> Option<f32> {
         let listened = self.listened? + self.period_cycles();
         let is_high = pac::GPIOB.idr().read().idr(12) == Idr::HIGH;
-        self.listened = if is_high || listened >= LISTENED_CYCLES { None } else { Some(listened) };
-        is_high.then(|| listened as f32 * (1.0 / CYCLES_A_MS))
+        self.listened = if is_high || listened >= LISTENED_MS * CYCLES_A_MS { None } else { Some(listened) };
+        is_high.then(|| listened as f32 * (1.0 / CYCLES_A_MS as f32))
     }
-
-    /// Longest time between the two \[ms\].
-    pub const LISTENED_MS: f32 = LISTENED_CYCLES as f32 / CYCLES_A_MS;
 
     /// Duty of the coming PWM period, gate driver awake or not, and bridge on or off; off acts at once.
     pub fn set(&mut self, duty_raw: i16, awake: bool, on: bool) {

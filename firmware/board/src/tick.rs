@@ -24,7 +24,7 @@ use heapless::spsc::Producer;
 use static_cell::StaticCell;
 
 use crate::analog::{Analog, Codes};
-use crate::bridge::Bridge;
+use crate::bridge::{Bridge, LISTENED_MS};
 use crate::clock::CORE_HZ;
 use crate::queues::{Given, TickEnds};
 use crate::{encoders, retained};
@@ -89,7 +89,7 @@ impl Inbox for Orders<'_> {
         }
         if let Some(let_go_ms) = self.let_go_ms.take() {
             self.order = Order::Stop;
-            return Some(act(&Command::Trip(Fault::DriverWarning, 0, let_go_ms, Bridge::LISTENED_MS)));
+            return Some(act(&Command::Trip(Fault::DriverWarning, 0, let_go_ms, LISTENED_MS as f32)));
         }
         if let Some(permille) = self.late_permille.take() {
             self.order = Order::Stop;

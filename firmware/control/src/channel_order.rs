@@ -56,7 +56,7 @@ fn part(tension: Tension, places: u32) -> Tension {
 }
 
 /// What was seen while the pulley moved one way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Way {
     /// Means of `F1 − F2` and of `F4 − F3`.
     along: [Tension; 2],
@@ -67,9 +67,6 @@ struct Way {
 }
 
 impl Way {
-    const NOTHING: Self =
-        Self { along: [Tension::ZERO; 2], looks: 0, extremes: [[Tension::ZERO; 2]; 2], wrong_looks: 0 };
-
     /// Takes a look.
     fn add(&mut self, along: [Tension; 2], across: Across) {
         if self.looks == 0 {
@@ -95,7 +92,7 @@ impl Way {
 }
 
 /// State of the watch.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ChannelOrder {
     /// Angle that follows the input pulley at half the way of a turn; none before the bridge goes on.
     follower: Option<Angle>,
@@ -103,17 +100,14 @@ pub struct ChannelOrder {
     ways: [Way; 2],
 }
 
-impl Default for ChannelOrder {
-    fn default() -> Self {
-        Self { follower: None, ways: [Way::NOTHING; 2] }
-    }
-}
-
 impl ChannelOrder {
     /// Forgets what was, for the time in which nothing drives the joint.
-    pub const fn reset(&mut self) {
+    pub fn reset(&mut self) {
         self.follower = None;
-        self.ways = [Way::NOTHING; 2];
+        for way in &mut self.ways {
+            // The first look begins everything else anew.
+            (way.looks, way.wrong_looks) = (0, 0);
+        }
     }
 
     /// A look at the tensions behind their low-pass.
@@ -133,7 +127,8 @@ impl ChannelOrder {
         *follower = theta_in.minus(within);
         let [f1, f2, f3, f4] = tensions;
         let against = part(config.pretension, AGAINST_PLACES);
-        let way = &mut self.ways[usize::from(ahead < Angle::ZERO)];
+        let is_down = ahead < Angle::ZERO;
+        let way = &mut self.ways[usize::from(is_down)];
         way.add([f1.minus(f2), f4.minus(f3)], [f1.minus(f3), f2.minus(f4)]);
         let falls = way.falls(part(config.pretension, SPAN_PLACES));
         let [up, down] = &mut self.ways;
@@ -144,7 +139,7 @@ impl ChannelOrder {
             (up.wrong_looks, down.wrong_looks) = (0, 0);
             return None;
         }
-        let way = if ahead < Angle::ZERO { down } else { up };
+        let way = if is_down { down } else { up };
         way.wrong_looks = way.wrong_looks.saturating_add(1);
         let [up, down] = &self.ways;
         if up.wrong_looks.min(down.wrong_looks) < LOOKS {

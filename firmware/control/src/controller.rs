@@ -6,7 +6,6 @@
 use bowden_link::message::Mode;
 use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
 
-use crate::channel_order::ChannelOrder;
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
 use crate::correction::lead::{Lead, Led};
 use crate::correction::ripple_table::RippleTable;
@@ -15,20 +14,16 @@ use crate::drive::yielding::YieldInput;
 use crate::drive::{Loops, PositionInput, TorqueInput};
 use crate::encoder::EncoderChannel;
 use crate::encoder::channel::EncoderFault;
-use crate::encoder::stuck::StuckWatch;
 use crate::impedance::ImpedanceInput;
-use crate::motion_watch::{MotionWatch, Turn};
-use crate::motor_circuit::MotorCircuit;
 use crate::observer::{Motion, Observer};
 use crate::reference::{Origin, ReferenceConfig, ReferenceState};
-use crate::restless_channels::RestlessChannels;
-use crate::scale::{Angle, Current, Quantity, Speed, Tension, Torque, Voltage};
+use crate::scale::{Angle, Current, Quantity, Tension, Torque, Voltage};
 use crate::sheath::{Fitted, SheathEstimate, SheathInput, SheathObserver};
 use crate::supervisor::{Situation, Supervisor};
 use crate::supply::Supply;
-use crate::surplus_current::SurplusCurrent;
 use crate::tension::TensionChannels;
 use crate::tick::{Command, Inbox, TickConfig, TickInput, TickOutput};
+use crate::watches::{Driven, Watches};
 
 /// Control of one joint.
 #[derive(Clone, Debug)]
@@ -36,12 +31,7 @@ pub struct Controller {
     config: TickConfig,
     supervisor: Supervisor,
     encoders: [EncoderChannel; 2],
-    stuck: StuckWatch,
-    motion: MotionWatch,
-    circuit: MotorCircuit,
-    surplus: SurplusCurrent,
-    restless: RestlessChannels,
-    order: ChannelOrder,
+    watches: Watches,
     tensions: TensionChannels,
     supply: Supply,
     observer: Observer,
@@ -94,12 +84,7 @@ impl Controller {
             config,
             supervisor: Supervisor::default(),
             encoders: [EncoderChannel::default(); 2],
-            stuck: StuckWatch::default(),
-            motion: MotionWatch::default(),
-            circuit: MotorCircuit::default(),
-            surplus: SurplusCurrent::default(),
-            restless: RestlessChannels::default(),
-            order: ChannelOrder::default(),
+            watches: Watches::default(),
             tensions: TensionChannels::default(),
             supply: Supply::default(),
             observer: Observer::default(),
@@ -140,18 +125,10 @@ impl Controller {
         let state = self.supervisor.state();
         let action = if state.drives() {
             let action = self.drive(&readings, inbox, &mut limits);
-            if self.motion.samples_now() {
-                self.circuit.sample(readings.current, action.duty_raw);
-                self.surplus.drive(action.duty_raw);
-            }
+            self.watches.sample(readings.current, action.duty_raw);
             action
         } else {
-            self.stuck.reset();
-            self.motion.reset();
-            self.circuit.reset();
-            self.surplus.reset();
-            self.restless.reset();
-            self.order.reset();
+            self.watches.reset();
             self.starts = false;
             // A joint that rests expects no friction.
             self.loops = Loops::default();
@@ -230,12 +207,7 @@ impl Controller {
     fn reset(&mut self) {
         self.supervisor = Supervisor::default();
         self.encoders.iter_mut().for_each(EncoderChannel::reset);
-        self.stuck = StuckWatch::default();
-        self.motion = MotionWatch::default();
-        self.circuit = MotorCircuit::default();
-        self.surplus = SurplusCurrent::default();
-        self.restless = RestlessChannels::default();
-        self.order = ChannelOrder::default();
+        self.watches = Watches::default();
         self.tensions = TensionChannels::default();
         self.supply = Supply::default();
         self.observer = Observer::default();
@@ -315,72 +287,30 @@ impl Controller {
             let bridge = heard.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
             let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
             let encoder = pulley.fault.map(|bad| of(0, bad)).or_else(|| joint.fault.map(|bad| of(1, bad)));
-            bridge.or(supply.found).or(encoder).or(tension).or_else(|| {
-                self.watch_motion(
-                    input,
-                    counts,
-                    theta,
-                    motion.speed,
-                    &tensions,
-                    (supply.current, supply.bus_filtered),
-                )
-            })
+            let driven = Driven {
+                counts,
+                theta,
+                speed_in: motion.speed,
+                tension_raw: &input.tension_raw,
+                tensions: &tensions,
+                channels: &self.tensions,
+                current: supply.current,
+                bus: supply.bus_filtered,
+            };
+            let (supervisor, reference) = (&self.supervisor, &self.reference);
+            let followed = || {
+                let follows = supervisor.state() == State::Run && supervisor.mode() == Mode::Position;
+                follows.then(|| Angle::from_bits(reference.value_bits()))
+            };
+            let watches = &mut self.watches;
+            let watched =
+                || supervisor.state().drives().then(|| watches.look(config, &driven, followed)).flatten();
+            bridge.or(supply.found).or(encoder).or(tension).or_else(watched)
         } else {
             None
         };
         let (current, bus) = (supply.current, supply.bus_filtered);
         Readings { counts, theta, lag, motion, tensions, load, measured_load, sheath, current, bus, found }
-    }
-
-    /// What is wrong with the motion of a joint that is driven.
-    fn watch_motion(
-        &mut self,
-        input: &TickInput,
-        counts: [i32; 2],
-        theta: [Angle; 2],
-        speed_in: Speed,
-        tensions: &[Tension; 4],
-        (current, bus): (Current, Voltage),
-    ) -> Option<Detection> {
-        if !self.supervisor.state().drives() {
-            return None;
-        }
-        let (config, encoders) = (&self.config.stuck, &self.config.encoder);
-        if let Some((channel, travel)) = self.stuck.observe(config, encoders, counts) {
-            let (got, limit) = (travel.to_f32(), config.travel.to_f32());
-            return Some(Detection { fault: bowden_link::Fault::EncoderStuck, channel, got, limit });
-        }
-        match self.motion.turn(&self.config.motion)? {
-            Turn::SurplusSpeed => {
-                self.surplus.speed(&self.config.circuit, speed_in);
-                None
-            }
-            Turn::SurplusCurrent => self.surplus.current(&self.config.circuit, current, bus),
-            Turn::Remember => {
-                self.restless.remember(&input.tension_raw);
-                None
-            }
-            Turn::Jumps => {
-                let (config, variance_raw) = (&self.config.tension, &self.config.supervisor.noise_limit);
-                self.restless.look(config.fitted, variance_raw, &input.tension_raw)
-            }
-            Turn::Order => {
-                let config = &self.config.tension;
-                self.tensions.filtered().and_then(|tensions| self.order.look(config, tensions, theta[0]))
-            }
-            Turn::Voltage => {
-                self.circuit.voltage(&self.config.circuit, theta[0], bus);
-                None
-            }
-            Turn::Current => self.circuit.current(&self.config.circuit),
-            Turn::Joint => {
-                let follows =
-                    self.supervisor.state() == State::Run && self.supervisor.mode() == Mode::Position;
-                let reference = follows.then(|| Angle::from_bits(self.reference.value_bits()));
-                self.motion.joint(&self.config.motion, theta[1], reference)
-            }
-            Turn::Tension(n) => self.motion.tension(&self.config.motion, n, &input.tension_raw, tensions),
-        }
     }
 
     fn drive(&mut self, readings: &Readings, inbox: &mut impl Inbox, limits: &mut Limits) -> Action {

@@ -48,6 +48,7 @@ pub mod supply;
 pub mod surplus_current;
 pub mod tension;
 pub mod tick;
+pub mod watches;
 pub mod winding;
 
 pub use parameters::{reference_config, tick_config};

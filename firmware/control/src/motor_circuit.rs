@@ -50,12 +50,12 @@ use bowden_link::message::Refusal;
 
 use crate::detection::Detection;
 use crate::parameters::{Parameters, tick_config};
-use crate::scale::{Angle, Current, Gain, Quantity, Ratio, Share, Speed, Voltage};
+use crate::scale::{Angle, Current, Gain, Quantity, Share, Speed, Voltage};
 
 /// Largest resistance, with its margin for the way to a steady state, over the one of the parameters.
 pub const RESISTANCE_FACTOR: f32 = 1.25 * 2.0;
-/// Part of the back-EMF by which it may be off.
-const BACK_EMF_TOLERANCE: Ratio = Ratio::from_parts(1, 4);
+/// Part of the back-EMF by which it may be off: 2⁻².
+const BACK_EMF_PLACES: u32 = 2;
 /// Looks in a row.
 const LOOKS: i8 = 3;
 /// Bits of a current that the sum over a look leaves out, so that it fits: 0.24 mA are left.
@@ -90,7 +90,13 @@ impl CircuitConfig {
     /// Largest part of a look's voltage that makes no current.
     #[inline]
     fn unknown(&self, back_emf: Voltage, bus: Voltage) -> Voltage {
-        self.dead_zone.of(bus).plus(BACK_EMF_TOLERANCE.of(back_emf.magnitude())).plus(self.count)
+        self.dead_zone.of(bus).plus(self.back_emf_unknown(back_emf))
+    }
+
+    /// How far a back-EMF may be off.
+    #[inline]
+    pub(crate) fn back_emf_unknown(&self, back_emf: Voltage) -> Voltage {
+        Voltage::from_bits(back_emf.magnitude().to_bits() >> BACK_EMF_PLACES).plus(self.count)
     }
 
     /// Least current that a voltage makes, the unknown part taken off, and whether a reading without current cannot hide it.

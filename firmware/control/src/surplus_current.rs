@@ -32,8 +32,6 @@ use crate::scale::{Current, Quantity, Speed, Voltage};
 
 /// A bound loses 2⁻⁷ of itself from one look to the next.
 const LOST_PLACES: u32 = 7;
-/// Part of the back-EMF by which it may be off, as in [`crate::motor_circuit`]: 2⁻².
-const BACK_EMF_PLACES: u32 = 2;
 /// Largest current of a voltage, over that of the nominal resistance.
 pub const CURRENT_FACTOR: f32 = 2.0;
 /// Looks in a row.
@@ -73,8 +71,7 @@ impl SurplusCurrent {
     #[inline(never)]
     pub fn current(&mut self, circuit: &CircuitConfig, current: Current, bus: Voltage) -> Option<Detection> {
         let across = voltage_of(self.duty_raw, circuit.reversed, bus).minus(self.back_emf);
-        let quarter = Voltage::from_bits(self.back_emf.magnitude().to_bits() >> BACK_EMF_PLACES);
-        let unknown = quarter.plus(circuit.count);
+        let unknown = circuit.back_emf_unknown(self.back_emf);
         self.high = kept(self.high).max(across.plus(unknown));
         self.low = kept(self.low).min(across.minus(unknown));
         // Nearly always.
@@ -230,6 +227,15 @@ mod tests {
             let found = at(bound_a + 0.01).unwrap();
             assert!((f64::from(found.limit) - bound_a).abs() < 2e-3, "{found:?}");
         }
+    }
+
+    /// 12 V, then nothing but 3 A: `12.138 (127/128)^n + 0.4067` V of a bound allow it up to the 196th look.
+    #[test]
+    fn a_bound_is_forgotten_with_time() {
+        let mut watch = SurplusCurrent::default();
+        assert!((0..10).all(|_| look(&mut watch, 12.0, 3.0, 0.0).is_none()));
+        let named = (1..400).find(|_| look(&mut watch, 0.0, 3.0, 0.0).is_some());
+        assert_eq!(named, Some(196 + 3));
     }
 
     /// Two looks on one side and two on the other, again and again, as noise has them.

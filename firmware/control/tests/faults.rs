@@ -287,6 +287,29 @@ fn a_tension_channel_that_jumps_about_is_found() {
     assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
 }
 
+/// Four or five jumps of the six that are a fault, and two or three in the next run: each run begins its counts anew.
+#[test]
+fn what_was_watched_in_a_run_does_not_count_in_the_next_one() {
+    let jumping: Disturbance = |input| {
+        if input.encoder[0].sequence & 1 == 1 {
+            input.tension_raw[1] += 120;
+        }
+    };
+    let mut bench = running(Parameters::default());
+    bench.disturbance = Some(jumping);
+    bench.run(0.18);
+    assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
+    bench.disturbance = None;
+    bench.order(Goal::Off);
+    bench.run(0.1);
+    bench.order(Goal::Ready);
+    assert!(bench.reaches(State::Ready, 1.0), "{:?}", bench.controller.fault());
+    bench.disturbance = Some(jumping);
+    bench.order(Goal::Run(Mode::Position));
+    bench.run(0.1);
+    assert_eq!(bench.controller.state(), State::Run, "{:?}", bench.controller.fault());
+}
+
 /// A leg at ground puts 12 V less on the motor, or 12 V more, 6 A in the end. The motor is off 0.8 to 2.4 ms later, and no tension is beyond its limit
 /// of 90 N behind it.
 #[test]
