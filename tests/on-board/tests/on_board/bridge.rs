@@ -43,7 +43,7 @@ fn the_break_input_opens_the_bridge_while_the_core_stands() -> Outcome {
     checked(&mut host, record)
 }
 
-/// The line of a driver that warns is low and high in turn, 56 us each with a DRV8305; that of a fault stays low until the driver was asleep.
+/// The line of a driver that warns is low and high in turn; that of a fault stays low until the driver was asleep.
 #[test]
 fn a_warning_of_the_gate_driver_is_told_from_its_fault() -> Outcome {
     for half_s in [20e-6, 56e-6, 300e-6] {
