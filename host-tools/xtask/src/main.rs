@@ -2,14 +2,13 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod board_page;
 mod browser;
 mod clippy;
 mod core_from_source;
 mod cross_target;
 mod debian;
 mod demo;
-mod endure;
-mod faults;
 mod files;
 mod firmware;
 mod fuzz;
@@ -56,10 +55,10 @@ enum Task {
     Fuzz(fuzz::Options),
     /// Break one or two things at a time on the emulated board, judge what the release image makes of it, and write
     /// tests/docs/faults.md; `faults --help` lists options
-    Faults(faults::Options),
+    Faults(board_page::Options),
     /// Drive the joint for a day natively and for ten minutes on the emulated board, check that nothing drifts, grows or gets lost, and
     /// write tests/docs/endurance.md; `endure --help` lists options
-    Endure(endure::Options),
+    Endure(board_page::Options),
     /// Build the release images for the driver board and print what they take of its memory
     Firmware,
     /// Run clippy on everything, the board's images among it; warnings are errors
@@ -74,8 +73,8 @@ fn main() -> ExitCode {
         Ok(Cli { task: Task::Prove(options) }) => prove::run(&options),
         Ok(Cli { task: Task::Paper(options) }) => paper::run(&options),
         Ok(Cli { task: Task::Fuzz(options) }) => fuzz::run(&options),
-        Ok(Cli { task: Task::Faults(options) }) => faults::run(&options),
-        Ok(Cli { task: Task::Endure(options) }) => endure::run(&options),
+        Ok(Cli { task: Task::Faults(options) }) => board_page::FAULTS.run(&options),
+        Ok(Cli { task: Task::Endure(options) }) => board_page::ENDURE.run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
         Ok(Cli { task: Task::Clippy }) => clippy::run(),
         Err(error) => return usage(&error),

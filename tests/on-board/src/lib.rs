@@ -17,6 +17,7 @@ pub mod image;
 pub mod load;
 pub mod paper;
 pub mod parallel;
+pub mod program;
 pub mod telemetry;
 pub mod ticks;
 pub mod tool;

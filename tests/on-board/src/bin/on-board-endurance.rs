@@ -9,14 +9,19 @@ use bowden_on_board_tests::endurance::check::{Check, failed};
 use bowden_on_board_tests::endurance::drift::Span;
 use bowden_on_board_tests::endurance::page::{self, Sections};
 use bowden_on_board_tests::endurance::{emulated, native};
-use bowden_on_board_tests::{Failure, Outcome, fail, image};
+use bowden_on_board_tests::program::{Program, value};
+use bowden_on_board_tests::{Outcome, fail, image};
 
-const HELP: &str = "cargo xtask endure [--native-hours H] [--emulated-seconds S]
+const PROGRAM: Program = Program {
+    name: "on-board-endurance",
+    help: "cargo xtask endure [--native-hours H] [--emulated-seconds S]
 
   --native-hours H      hours of board time natively; 24 unless given, 0 for none. A run in which all counters wrap goes before
   --emulated-seconds S  seconds of board time on the emulated board; 600 unless given, 0 for none
 
-A run that is left out keeps its section of the page.";
+A run that is left out keeps its section of the page.",
+    options: &["--native-hours", "--emulated-seconds", "--page", "--provenance"],
+};
 
 /// What was asked for.
 struct Options {
@@ -24,58 +29,32 @@ struct Options {
     emulated_seconds: usize,
     page: Option<PathBuf>,
     provenance: String,
-    help: bool,
 }
 
-fn options() -> Outcome<Options> {
-    let mut options = Options {
+fn take(options: &mut Options, option: &str, given: String) -> Outcome {
+    match option {
+        "--native-hours" => {
+            let is_allowed = |hours: &f64| (0.0..=1000.0).contains(hours);
+            options.native_hours = value(option, &given, "hours from 0 to 1000", is_allowed)?;
+        }
+        "--emulated-seconds" => {
+            let expected = "a whole number of seconds up to 86400";
+            options.emulated_seconds = value(option, &given, expected, |seconds| *seconds <= 86_400)?;
+        }
+        "--page" => options.page = Some(given.into()),
+        _ => options.provenance = given,
+    }
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let options = Options {
         native_hours: 24.0,
         emulated_seconds: 600,
         page: None,
         provenance: "date and commit not given".into(),
-        help: false,
     };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        if matches!(argument.as_str(), "--help" | "-h") {
-            return Ok(Options { help: true, ..options });
-        }
-        if !["--native-hours", "--emulated-seconds", "--page", "--provenance"].contains(&argument.as_str()) {
-            return fail(format!("{argument}: not an option; --help lists them"));
-        }
-        let value = arguments.next().ok_or_else(|| Failure(format!("{argument}: expected a value")))?;
-        let refuse = |expected: &str| Failure(format!("{argument} {value}: expected {expected}"));
-        match argument.as_str() {
-            "--native-hours" => {
-                let hours = value.parse().ok().filter(|hours| (0.0..=1000.0).contains(hours));
-                options.native_hours = hours.ok_or_else(|| refuse("hours from 0 to 1000"))?;
-            }
-            "--emulated-seconds" => {
-                let seconds = value.parse().ok().filter(|seconds| *seconds <= 86_400);
-                options.emulated_seconds =
-                    seconds.ok_or_else(|| refuse("a whole number of seconds up to 86400"))?;
-            }
-            "--page" => options.page = Some(value.into()),
-            _ => options.provenance = value,
-        }
-    }
-    Ok(options)
-}
-
-fn main() -> ExitCode {
-    match options().and_then(|options| if options.help { help() } else { endure(&options) }) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("on-board-endurance: {failure}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-#[expect(clippy::unnecessary_wraps, reason = "the other way through the program has an outcome")]
-fn help() -> Outcome {
-    println!("{HELP}");
-    Ok(())
+    PROGRAM.run(options, take, endure)
 }
 
 fn error_line(kind: &str, number: usize, span: &Span) -> String {

@@ -12,15 +12,20 @@ use bowden_on_board_tests::campaign::phase::Phase;
 use bowden_on_board_tests::campaign::run::{run, stored};
 use bowden_on_board_tests::corrections::write;
 use bowden_on_board_tests::parallel::in_parallel;
-use bowden_on_board_tests::{Failure, Outcome, fail, image};
+use bowden_on_board_tests::program::{Program, value};
+use bowden_on_board_tests::{Failure, Outcome, image};
 
-const HELP: &str = "cargo xtask faults [--seed N] [--cases N] [--only PATTERN] [--jobs N] [--minutes N]
+const PROGRAM: Program = Program {
+    name: "on-board-faults",
+    help: "cargo xtask faults [--seed N] [--cases N] [--only PATTERN] [--jobs N] [--minutes N]
 
   --seed N        draws another campaign; 1 unless given
   --cases N       number of cases; 520 unless given
   --only PATTERN  only cases whose names contain it, or the one case of this name; no page is written then
   --jobs N        boards at a time; 2 unless given
-  --minutes N     begin no case later than this";
+  --minutes N     begin no case later than this",
+    options: &["--seed", "--cases", "--only", "--jobs", "--minutes", "--page", "--provenance"],
+};
 
 /// What was asked for.
 struct Options {
@@ -31,11 +36,27 @@ struct Options {
     minutes: Option<u64>,
     page: Option<PathBuf>,
     provenance: String,
-    help: bool,
 }
 
-fn options() -> Outcome<Options> {
-    let mut options = Options {
+fn take(options: &mut Options, option: &str, given: String) -> Outcome {
+    let number = || {
+        let is_allowed = |number: &u64| (1..=1_000_000).contains(number);
+        value(option, &given, "a whole number from 1 to 1000000", is_allowed)
+    };
+    match option {
+        "--seed" => options.seed = number()?,
+        "--cases" => options.cases = number()? as usize,
+        "--jobs" => options.jobs = number()? as usize,
+        "--minutes" => options.minutes = Some(number()?),
+        "--only" => options.only = Some(given),
+        "--page" => options.page = Some(given.into()),
+        _ => options.provenance = given,
+    }
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let options = Options {
         seed: 1,
         cases: 520,
         only: None,
@@ -43,51 +64,8 @@ fn options() -> Outcome<Options> {
         minutes: None,
         page: None,
         provenance: "date and commit not given".into(),
-        help: false,
     };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        if matches!(argument.as_str(), "--help" | "-h") {
-            return Ok(Options { help: true, ..options });
-        }
-        let known = ["--seed", "--cases", "--only", "--jobs", "--minutes", "--page", "--provenance"];
-        if !known.contains(&argument.as_str()) {
-            return fail(format!("{argument}: not an option; --help lists them"));
-        }
-        let value = arguments.next().ok_or_else(|| Failure(format!("{argument}: expected a value")))?;
-        let number = || {
-            let parsed = value.parse::<u64>().ok().filter(|number| (1..=1_000_000).contains(number));
-            parsed.ok_or_else(|| {
-                Failure(format!("{argument} {value}: expected a whole number from 1 to 1000000"))
-            })
-        };
-        match argument.as_str() {
-            "--seed" => options.seed = number()?,
-            "--cases" => options.cases = number()? as usize,
-            "--jobs" => options.jobs = number()? as usize,
-            "--minutes" => options.minutes = Some(number()?),
-            "--only" => options.only = Some(value),
-            "--page" => options.page = Some(value.into()),
-            _ => options.provenance = value,
-        }
-    }
-    Ok(options)
-}
-
-fn main() -> ExitCode {
-    match options().and_then(|options| if options.help { help() } else { campaign(&options) }) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("on-board-faults: {failure}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-#[expect(clippy::unnecessary_wraps, reason = "the other way through the program has an outcome")]
-fn help() -> Outcome {
-    println!("{HELP}");
-    Ok(())
+    PROGRAM.run(options, take, campaign)
 }
 
 /// The cases that were asked for.

@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use bowden_control::conformance::amt22_frame;
 use bowden_control::tick::{EncoderWord, TickInput};
 use bowden_host_link::sim::Joint;
 
@@ -109,7 +110,7 @@ impl CoarseJoint {
         for (which, zero_counts) in ZEROS_COUNTS.into_iter().enumerate() {
             let counts = (self.theta_rad[which] / TAU * COUNTS_PER_TURN + zero_counts).round() as i64;
             self.counts[which] = counts;
-            let frame_raw = amt22((counts & 0xfff) as u32);
+            let frame_raw = amt22_frame((counts & 0xfff) as u32);
             self.words[which] = EncoderWord { frame_raw, sequence: self.sequence, bus_error: false };
         }
     }
@@ -152,11 +153,4 @@ impl Joint for CoarseJoint {
         }
         (self.duty, self.bridge_on) = (duty, bridge_on);
     }
-}
-
-/// A frame of a 12-bit AMT22 by its data sheet: two check bits over every second bit, the count, two zeros.
-fn amt22(count: u32) -> u32 {
-    let field = count << 2;
-    let even = |mask: u32| u32::from((field & mask).count_ones().is_multiple_of(2));
-    even(0x2aaa) << 15 | even(0x1555) << 14 | field
 }
