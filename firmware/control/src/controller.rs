@@ -4,7 +4,7 @@
 //! depends on data. A detection switches the bridge off in the very tick.
 
 use bowden_link::message::Mode;
-use bowden_link::{FaultRecord, Limit, Limits, Sample, State};
+use bowden_link::{Fault, FaultRecord, Limit, Limits, Sample, State};
 
 use crate::compensator::{CompensatorInput, CompensatorState, compensate};
 use crate::correction::lead::{Lead, Led};
@@ -282,11 +282,14 @@ impl Controller {
         };
         let sheath = self.sheaths.observe(&config.sheath, &measured);
         let load = if motor_side { torque_in } else { self.observer.load(&config.observer) };
-        let found = if self.supervisor.watches() {
-            let heard = input.bridge_fault && self.supervisor.hears_driver(&config.supervisor);
-            let bridge = heard.then(|| Detection::new(bowden_link::Fault::BridgeFault, 0, 1.0, 0.0));
-            let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
-            let encoder = pulley.fault.map(|bad| of(0, bad)).or_else(|| joint.fault.map(|bad| of(1, bad)));
+        let warned = input.bridge_fault && self.supervisor.hears_driver(&config.supervisor);
+        let encoder = pulley.fault.is_some() || joint.fault.is_some();
+        // Options that hold a detection are moved about only where there is one.
+        let found = if !self.supervisor.watches() {
+            None
+        } else if warned || supply.found.is_some() || encoder || tension.is_some() {
+            named(warned, supply.found, [pulley.fault, joint.fault], tension)
+        } else if self.supervisor.state().drives() {
             let driven = Driven {
                 counts,
                 theta,
@@ -302,10 +305,7 @@ impl Controller {
                 let follows = supervisor.state() == State::Run && supervisor.mode() == Mode::Position;
                 follows.then(|| Angle::from_bits(reference.value_bits()))
             };
-            let watches = &mut self.watches;
-            let watched =
-                || supervisor.state().drives().then(|| watches.look(config, &driven, followed)).flatten();
-            bridge.or(supply.found).or(encoder).or(tension).or_else(watched)
+            self.watches.look(config, &driven, followed)
         } else {
             None
         };
@@ -481,4 +481,20 @@ impl Controller {
     pub const fn tick_count(&self) -> u32 {
         self.ticks
     }
+}
+
+/// The first fault of what the hardware told in a tick: of the bridge, the supply, the encoders, the tensions.
+#[cold]
+#[inline(never)]
+fn named(
+    bridge: bool,
+    supply: Option<Detection>,
+    encoders: [Option<EncoderFault>; 2],
+    tension: Option<Detection>,
+) -> Option<Detection> {
+    let bridge = bridge.then(|| Detection::new(Fault::BridgeFault, 0, 1.0, 0.0));
+    let of = |n: usize, bad: EncoderFault| Detection::new(bad.fault, n, bad.got, bad.limit);
+    let [pulley, joint] = encoders;
+    let encoder = pulley.map(|bad| of(0, bad)).or_else(|| joint.map(|bad| of(1, bad)));
+    bridge.or(supply).or(encoder).or(tension)
 }

@@ -278,8 +278,8 @@ pub struct SheathObserver {
 }
 
 impl SheathObserver {
-    /// One tick; kept out of line so that its instructions can be counted.
-    #[inline(never)]
+    /// One tick.
+    #[inline]
     pub fn observe(&mut self, config: &SheathConfig, input: &SheathInput) -> SheathEstimate {
         let measured_in = match config.fitted {
             Fitted::Nothing => {
