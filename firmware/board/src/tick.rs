@@ -66,6 +66,8 @@ struct Tick {
     ends: TickEnds,
     /// Length of the tick before in thousandths of its period, if it was late.
     late_permille: Option<u32>,
+    /// Beginning of the tick before, core cycles, if it left the bridge on.
+    driven_since: Option<u32>,
 }
 
 /// Orders to the controller: a late tick comes before what the host wants.
@@ -132,7 +134,8 @@ impl Tick {
         let supply_low = bridge_fault && Bridge::supply_is_low();
         let input = TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault };
         let number = self.controller.tick_count();
-        let late_permille = self.late_permille.take();
+        let late_permille = self.late_permille.take().or_else(|| self.missed_permille(begun));
+        self.driven_since = None;
         let mut orders = Orders {
             ends: &mut self.ends,
             late_permille,
@@ -147,6 +150,9 @@ impl Tick {
             self.bridge.listen();
         }
         self.bridge.set(output.duty_raw, output.driver_on, output.bridge_on);
+        if output.bridge_on {
+            self.driven_since = Some(begun);
+        }
         let ring = &retained::memory().snapshot;
         ring.push(number, &output.sample);
         if let Some(record) = output.tripped {
@@ -182,11 +188,25 @@ impl Tick {
             TOLD.longest_cycles.store(busy, Ordering::Relaxed);
         }
         if self.analog.next_is_ready() {
-            // Integers: a float division has no place in a tick, and a tick that is late least of all.
-            self.late_permille = Some(busy.saturating_mul(100) / (self.bridge.period_cycles() / 10));
+            self.late_permille = Some(permille(busy, self.bridge.period_cycles()));
         }
         self.marker.set_low();
     }
+
+    /// Time since the tick before in thousandths of a period, if the bridge was on for half a period more than one: the core stood, or
+    /// interrupts were masked. The period changes with the bridge off only.
+    #[inline]
+    fn missed_permille(&self, begun: u32) -> Option<u32> {
+        let (since, period) = (begun.wrapping_sub(self.driven_since?), self.bridge.period_cycles());
+        (since > period + period / 2).then(|| permille(since, period))
+    }
+}
+
+/// Cycles in thousandths of a period. Integers: a float division has no place in a tick, and a tick that is late least of all.
+#[cold]
+#[inline(never)]
+fn permille(cycles: u32, period: u32) -> u32 {
+    cycles.saturating_mul(100) / (period / 10)
 }
 
 /// Hands what went into a tick to telemetry; `false` if there is no room.
@@ -217,7 +237,15 @@ pub fn start(
     let controller = Controller::new(config);
     // What was converted while nobody listened belongs to no tick.
     analog.read();
-    let tick = PLACE.init(Tick { controller, bridge, analog, marker, ends, late_permille: None });
+    let tick = PLACE.init(Tick {
+        controller,
+        bridge,
+        analog,
+        marker,
+        ends,
+        late_permille: None,
+        driven_since: None,
+    });
     TICK.store(tick, Ordering::Release);
     interrupt::ADC1_2.unpend();
     interrupt::ADC1_2.set_priority(Priority::P0);

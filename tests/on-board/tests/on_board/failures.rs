@@ -1,7 +1,7 @@
 //! Failures of the firmware itself, provoked by the host: panic, processor fault, stack overflow, hang, late tick.
 
 use bowden_board::{Board, ResetCause};
-use bowden_link::message::{Boot, Goal, Provocation, Refusal};
+use bowden_link::message::{Boot, Goal, Mode, Provocation, Refusal};
 use bowden_link::{Fault, FromBoard, State, ToBoard};
 use bowden_on_board_tests::host::Host;
 use bowden_on_board_tests::{Outcome, fail, image};
@@ -45,6 +45,42 @@ fn a_late_tick_is_a_fault() -> Outcome {
     // More than a period on purpose.
     assert!((1.2..5.0).contains(&record.got) && record.limit == 1.0, "{record}");
     assert_eq!(host.board.counters().boots, 1);
+    Ok(())
+}
+
+/// The core stands for a millisecond, beginning in a tick and at several places between two: nine ticks and more are missed while the bridge
+/// is on. With the bridge off nothing is driven, and nothing stops, unless a tick begins or ends too late for
+/// the next one.
+#[test]
+fn ticks_that_are_missed_while_the_bridge_is_on_are_a_fault() -> Outcome {
+    let stands = |host: &mut Host, share: f64| -> Outcome {
+        let ticks = host.ticks.begun;
+        while host.ticks.begun == ticks {
+            host.pass(1e-6)?;
+        }
+        host.pass(share * PERIOD_S)?;
+        host.board.stall_core(true);
+        host.pass(1e-3)?;
+        host.board.stall_core(false);
+        Ok(())
+    };
+    let mut host = moving()?;
+    for share in [0.05, 0.3, 0.5, 0.7, 0.95] {
+        stands(&mut host, share)?;
+        let (record, opening) = stopped(&mut host, 0.02)?;
+        assert_eq!(record.fault, Fault::TickOverrun, "{share}: {record}");
+        assert!((10.0..12.0).contains(&record.got) && record.limit == 1.0, "{share}: {record}");
+        assert!(opening.after_s < 2.0 * PERIOD_S, "{share}: {opening:?}");
+        if (0.2..0.8).contains(&share) {
+            stands(&mut host, share)?;
+            host.run(0.01)?;
+            assert_eq!(host.status()?.fault, None, "{share}");
+        }
+        host.make_ready()?;
+        host.order(&ToBoard::Enter(Goal::Run(Mode::Position)))?;
+        host.reach(State::Run, 0.1)?;
+        host.run(0.1)?;
+    }
     Ok(())
 }
 
