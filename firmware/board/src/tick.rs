@@ -134,6 +134,10 @@ impl Tick {
         let supply_low = bridge_fault && Bridge::supply_is_low();
         let input = TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault };
         let number = self.controller.tick_count();
+        if bridge_fault {
+            // It says more of what happened meanwhile.
+            self.driven_since = None;
+        }
         let late_permille = self.late_permille.take().or_else(|| self.missed_permille(begun));
         self.driven_since = None;
         let mut orders = Orders {
