@@ -134,12 +134,9 @@ impl Tick {
         let supply_low = bridge_fault && Bridge::supply_is_low();
         let input = TickInput { encoder, tension_raw, current_raw, bus_raw, bridge_fault };
         let number = self.controller.tick_count();
-        if bridge_fault {
-            // It says more of what happened meanwhile.
-            self.driven_since = None;
-        }
-        let late_permille = self.late_permille.take().or_else(|| self.missed_permille(begun));
-        self.driven_since = None;
+        // A fault of the bridge says more of what happened meanwhile.
+        let driven_since = self.driven_since.take().filter(|_| !bridge_fault);
+        let late_permille = self.late_permille.take().or_else(|| self.missed_permille(driven_since?, begun));
         let mut orders = Orders {
             ends: &mut self.ends,
             late_permille,
@@ -197,11 +194,11 @@ impl Tick {
         self.marker.set_low();
     }
 
-    /// Time since the tick before in thousandths of a period, if the bridge was on for half a period more than one: the core stood, or
-    /// interrupts were masked. The period changes with the bridge off only.
+    /// Time from one tick to the next in thousandths of a period, if it is half a period more than one: the core stood, or interrupts
+    /// were masked. For ticks with the bridge on: the period changes with the bridge off only.
     #[inline]
-    fn missed_permille(&self, begun: u32) -> Option<u32> {
-        let (since, period) = (begun.wrapping_sub(self.driven_since?), self.bridge.period_cycles());
+    fn missed_permille(&self, before: u32, begun: u32) -> Option<u32> {
+        let (since, period) = (begun.wrapping_sub(before), self.bridge.period_cycles());
         (since > period + period / 2).then(|| permille(since, period))
     }
 }
