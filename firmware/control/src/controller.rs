@@ -498,3 +498,26 @@ fn named(
     let encoder = pulley.map(|bad| of(0, bad)).or_else(|| joint.map(|bad| of(1, bad)));
     bridge.or(supply).or(encoder).or(tension)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What comes first says why the others are there: a bridge that stopped, a supply that fell, an encoder that is off.
+    #[test]
+    fn of_faults_in_one_tick_the_bridge_comes_first_then_supply_encoders_and_tensions() {
+        let supply = Some(Detection::new(Fault::BusUnderVoltage, 0, 9.0, 10.0));
+        let encoder = |fault| Some(EncoderFault { fault, got: 4.0, limit: 4.0 });
+        let encoders = [encoder(Fault::EncoderMissing), encoder(Fault::EncoderJump)];
+        let tension = Some(Detection::new(Fault::Slack, 2, 0.5, 1.0));
+        let found = |bridge, supply, encoders| {
+            named(bridge, supply, encoders, tension).map(|found| (found.fault, found.channel))
+        };
+        assert_eq!(found(true, supply, encoders), Some((Fault::BridgeFault, 0)));
+        assert_eq!(found(false, supply, encoders), Some((Fault::BusUnderVoltage, 0)));
+        assert_eq!(found(false, None, encoders), Some((Fault::EncoderMissing, 0)));
+        assert_eq!(found(false, None, [None, encoders[1]]), Some((Fault::EncoderJump, 1)));
+        assert_eq!(found(false, None, [None; 2]), Some((Fault::Slack, 2)));
+        assert_eq!(named(false, None, [None; 2], None), None);
+    }
+}
