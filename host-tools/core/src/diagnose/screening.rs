@@ -5,6 +5,9 @@
 //! after a refit is estimated as `min_b |P (r + b (r_c - r))|²` with the projection `P = 1 - J (JᵀJ)⁻¹ Jᵀ`: exact for an
 //! effect that enters linearly, a ranking for the others; those that it ranks first are simulated at their estimated strength.
 //!
+//! A replay of a guided motor is simulated whole here. Its first pass alone ranks nearly alike at half the price, but loses the play of
+//! a joint in fast motion (`play_of_the_joint_is_found_in_a_fast_motion`).
+//!
 //! Where a parameter has taken the place of what is missing, as a weight that of a spring, most of what the effect changes is
 //! what parameters change too; the little by which the two differ is lost in the curvature of so long a way. Such a start is
 //! simulated again with the parameters where the slopes would put them, and once more from there if that was better. Those that
