@@ -5,8 +5,8 @@
 //! after a refit is estimated as `min_b |P (r + b (r_c - r))|²` with the projection `P = 1 - J (JᵀJ)⁻¹ Jᵀ`: exact for an
 //! effect that enters linearly, a ranking for the others; those that it ranks first are simulated at their estimated strength.
 //!
-//! A replay of a guided motor is simulated whole here. Its first pass alone ranks nearly alike at half the price, but loses the play of
-//! a joint in fast motion (`play_of_the_joint_is_found_in_a_fast_motion`).
+//! A replay of a guided motor is simulated whole: its first pass alone misleads the ranking where a joint with play moves fast
+//! (`play_of_the_joint_is_found_in_a_fast_motion` fails with it).
 //!
 //! Where a parameter has taken the place of what is missing, as a weight that of a spring, most of what the effect changes is
 //! what parameters change too; the little by which the two differ is lost in the curvature of so long a way. Such a start is

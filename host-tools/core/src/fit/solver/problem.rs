@@ -9,8 +9,6 @@
 //!
 //! with the step `s` from residuals `r` to `r'`. A step that keeps less than [`KEPT`] of it asks for slopes of its own place. So does every
 //! step where a moment is fitted: what happens at one shows in few residuals, which say little of the way there.
-//!
-//! Slopes are those of whole replays. Of the first pass of a guided motor alone they cost half, but a fit to them stops beside the place.
 
 use std::sync::{Mutex, PoisonError};
 
