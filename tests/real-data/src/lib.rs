@@ -109,13 +109,17 @@ macro_rules! rig_file {
 }
 use rig_file;
 
-/// Effects of the catalogue with some values, and the usual ones of the others.
+/// Effects of the catalogue with some values, and the usual ones of the others. A name that the catalogue does not have panics: without
+/// it another joint would be measured.
 fn with_values(effects: &[(&str, &[(&str, f64)])]) -> Vec<ActiveEffect> {
     let of = |(id, values): &(&str, &[(&str, f64)])| {
-        let usual = ActiveEffect::with_defaults(find(id)?);
-        Some(values.iter().fold(usual, |effect, (name, value)| effect.with(name, *value)))
+        let effect = find(id).unwrap_or_else(|| panic!("{id}: no effect of the catalogue"));
+        values.iter().fold(ActiveEffect::with_defaults(effect), |effect, (name, value)| {
+            assert!(effect.descriptor().index_of(name).is_some(), "{id}: no parameter {name}");
+            effect.with(name, *value)
+        })
     };
-    effects.iter().filter_map(of).collect()
+    effects.iter().map(of).collect()
 }
 
 /// The reason for a file of a data set that cannot be used.

@@ -1,12 +1,10 @@
 //! `bowden record` on the simulated board, then `bowden diagnose`: what the board writes is what a diagnosis can use.
 
-mod common;
-
 use std::fs;
 
+use crate::common::bowden;
 use bowden_core::recording::{ReadOptions, Recording};
 use bowden_model::channel::Channel;
-use common::bowden;
 use serde_json::Value;
 use tempfile::tempdir;
 

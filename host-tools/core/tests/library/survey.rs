@@ -1,6 +1,6 @@
 //! Surveys: many recordings of several benches, ended and taken up again, with one that is no recording among them.
 
-#[path = "../build/sources.rs"]
+#[path = "../../build/sources.rs"]
 mod sources;
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use bowden_core::survey::{Plan, Summary, survey};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 
-const RIG: &str = include_str!("rigs/bench.toml");
+const RIG: &str = include_str!("../rigs/bench.toml");
 
 /// Dry friction of the joint, which the rig file does not state.
 const STICKING: &str = "

@@ -1,14 +1,12 @@
 //! Models of MuJoCo and URDF into rigs, and a diagnosed rig out to MuJoCo, by the command.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
+use crate::common::bowden;
 use bowden_core::rig::Rig;
-use common::bowden;
 
-const BENCH: &str = include_str!("../core/tests/rigs/bench.toml");
+const BENCH: &str = include_str!("../../core/tests/rigs/bench.toml");
 const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/core/tests/models");
 
 /// A folder with `base.toml`, and a model that others wrote.

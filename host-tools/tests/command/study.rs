@@ -1,11 +1,10 @@
 //! Studies: several benches and recordings fitted together, and what is refused.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use crate::common::bowden;
 use bowden_core::diagnose::verdict::Diagnosis;
 use bowden_core::fit::recalibrate::recalibrate;
 use bowden_core::progress::Quiet;
@@ -14,7 +13,6 @@ use bowden_core::rig::{Assignment, Rig};
 use bowden_core::simulate::{Motion, Reference, RunOptions, run};
 use bowden_core::study::LoadedStudy;
 use bowden_model::channel::Channel;
-use common::bowden;
 
 /// What a bench really is, beside what its rig file states.
 struct Truth {

@@ -1,14 +1,12 @@
 //! What recordings do not settle, from the first diagnosis to the recording that settles it.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use crate::common::bowden;
 use bowden_core::diagnose::verdict::Diagnosis;
 use bowden_core::rig::Rig;
-use common::bowden;
 
 /// Cables without a motor: an input angle that is followed, an output that carries nothing.
 const RIG: &str = r#"schema = "bowden-rig/1"

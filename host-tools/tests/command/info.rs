@@ -1,12 +1,10 @@
 //! `bowden info` and `check` on recordings, and Parquet as other programs read it.
 
-mod common;
-
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::fs::{self, File};
 
-use common::bowden;
+use crate::common::bowden;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 

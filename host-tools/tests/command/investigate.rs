@@ -1,10 +1,5 @@
 //! `bowden investigate` from end to end on the simulated board, whose joint is the virtual bench; in virtual time.
 
-mod common;
-#[path = "common/screen.rs"]
-#[expect(dead_code, reason = "another part of it is for the tests of the monitor")]
-mod screen;
-
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,6 +8,8 @@ use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
+use crate::common::{bowden, command};
+use crate::screen::Screen;
 use bowden_core::outcome::Failure;
 use bowden_core::progress::Quiet;
 use bowden_host_link::evidence::Origin;
@@ -20,8 +17,6 @@ use bowden_host_link::investigate::limits::Wishes;
 use bowden_host_link::investigate::{Dialog, Setup, investigate};
 use bowden_host_link::sim::SimTransport;
 use bowden_host_link::{Client, Transport};
-use common::{bowden, command};
-use screen::Screen;
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,18 +1,13 @@
 //! What makes the command usable: completions, manual pages, `doctor`, facts as JSON, no colours in a pipe.
 
-mod common;
-#[path = "common/screen.rs"]
-#[expect(dead_code, reason = "another part of it is for the tests of the monitor")]
-mod screen;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use crate::common::bowden;
+use crate::screen::Screen;
 use bowden_core::recording::Recording;
 use bowden_model::channel::Channel;
-use common::bowden;
-use screen::Screen;
 
 /// Subcommands, by what the help lists.
 fn subcommands() -> Vec<String> {

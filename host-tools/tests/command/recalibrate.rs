@@ -1,10 +1,9 @@
 //! A fit on recordings of the model itself, whose parameters are known: what comes back, and what cannot.
 
-mod common;
-
 use std::fmt::Write;
 use std::fs;
 
+use crate::common::bowden;
 use bowden_core::fit::identifiability::indistinguishable;
 use bowden_core::fit::objective::Objective;
 use bowden_core::fit::recalibrate::recalibrate;
@@ -16,7 +15,6 @@ use bowden_core::simulate::{Motion, Reference, RunOptions, run};
 use bowden_core::study::Study;
 use bowden_model::channel::Channel::{BusVoltage, Duty, ThetaIn};
 use bowden_model::parameters::nominal;
-use common::bowden;
 
 const RIG: &str = r#"schema = "bowden-rig/1"
 name = "bench"

@@ -1,14 +1,12 @@
 //! Bad input on real processes: exit status, and one line that says file, place and what is wrong.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use common::bowden;
+use crate::common::bowden;
 use tempfile::TempDir;
 
 /// Samples of the recording that each case starts from.

@@ -14,7 +14,7 @@ fn model(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(name)
 }
 
-const BENCH: &str = include_str!("rigs/bench.toml");
+const BENCH: &str = include_str!("../rigs/bench.toml");
 
 fn bench() -> RigDocument {
     RigDocument::parse(BENCH, "bench.toml").unwrap()
