@@ -198,19 +198,20 @@ fn passes<const SEGMENTS: usize>(
     let from_output = end == End::Output;
     let segment = |j: usize| if from_output { n - j } else { j };
     let contact = |i: usize| if from_output { n - 1 - i } else { i };
-    let both = |of: &dyn Fn(&Pull<'_>) -> f64| f64x2::new(pulls.map(of));
-    let pull_m = both(&|pull| pull.stretch_m);
+    // Lane by lane: `map` over an array is not compiled in place everywhere, and then takes as long as the passes.
+    let [a, b] = pulls;
+    let pull_m = f64x2::new([a.stretch_m, b.stretch_m]);
     let pulled = pull_m.cmp_gt(f64x2::ZERO);
     // No contact travels farther than the end: the chord of the exponential up to there never passes the limit.
-    let decay_per_m =
-        both(&|pull| mobilised(pull.stretch_m.abs() / pull.presliding_m) / pull.stretch_m.abs());
-    let limit = |of: fn(&SlipLimits) -> &[f64; MAX_ELEMENTS], i: usize| {
-        f64x2::new(pulls.map(|pull| of(pull.limits)[contact(i)]))
-    };
+    let decay_of =
+        |pull: &Pull<'_>| mobilised(pull.stretch_m.abs() / pull.presliding_m) / pull.stretch_m.abs();
+    let decay_per_m = f64x2::new([decay_of(a), decay_of(b)]);
+    let [limits_a, limits_b] = [a.limits, b.limits];
+    let limit = |of: [&[f64; MAX_ELEMENTS]; 2], i: usize| f64x2::new([of[0][contact(i)], of[1][contact(i)]]);
 
     let mut tension_n = [f64x2::ZERO; SEGMENTS];
     for (j, tension) in tension_n.iter_mut().enumerate().take(n + 1) {
-        *tension = f64x2::new(tendons.map(|tendon| tendon.tension_n[segment(j)]));
+        *tension = f64x2::new([tendons[0].tension_n[segment(j)], tendons[1].tension_n[segment(j)]]);
     }
 
     // Per contact: dT_{j+1} = slope dT_j - grip x, turned into x = share X_{j+1} dT_j, share = slope / (1 + grip X).
@@ -219,8 +220,9 @@ fn passes<const SEGMENTS: usize>(
     let mut all_slip = f64x2::ZERO.cmp_ge(f64x2::ZERO);
     for i in 0..n {
         let (near, far) = (tension_n[i], tension_n[i + 1]);
-        let (down, up) = (limit(|limits| &limits.ratio, i), limit(|limits| &limits.inverse_ratio, i));
-        let offset = limit(|limits| &limits.offset_share, i);
+        let down = limit([&limits_a.ratio, &limits_b.ratio], i);
+        let up = limit([&limits_a.inverse_ratio, &limits_b.inverse_ratio], i);
+        let offset = limit([&limits_a.offset_share, &limits_b.offset_share], i);
         let width = up - down;
         let range = width * near + (up + f64x2::ONE) * offset;
         let above = far - (down * near - offset);
@@ -265,7 +267,8 @@ fn passes<const SEGMENTS: usize>(
     }
     let mut scaled_rise_n = f64x2::new(rise_n) / denominator;
     if pulls.iter().any(|pull| pull.unilateral) {
-        let floor = both(&|pull| if pull.unilateral { 0.0 } else { f64::NEG_INFINITY });
+        let floor_of = |pull: &Pull<'_>| if pull.unilateral { 0.0 } else { f64::NEG_INFINITY };
+        let floor = f64x2::new([floor_of(a), floor_of(b)]);
         let mut slack = f64x2::new(slack_m);
         for j in 0..=n {
             let tension = tension_n[j] + scaled_rise_n * denominators[j];
