@@ -631,7 +631,7 @@ fn a_defect_is_one_line_and_exit_status_1() {
         let _ = worker.join();
         unreachable!("a panic in any thread ends the process");
     }
-    let this_test = ["--exact", "a_defect_is_one_line_and_exit_status_1", "--nocapture"];
+    let this_test = ["--exact", "bad_input::a_defect_is_one_line_and_exit_status_1", "--nocapture"];
     let output =
         Command::new(std::env::current_exe().unwrap()).args(this_test).env(PANICS, "1").output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
