@@ -2,10 +2,11 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use bowden_core::recording::{ReadOptions, Recording};
 use bowden_model::channel::Channel;
+
+use crate::common::bowden;
 
 const MOTOR: &str = r"
 [motor]
@@ -56,18 +57,12 @@ fn simulate(parts: &[&str], options: &[&str]) -> Result<Recording, (i32, String)
     let reference = "t_s,theta_ref_rad\n5.0,0.2\n6.0,0.4\n6.5,0.4\n";
     fs::write(folder.path().join("reference.csv"), reference).unwrap();
     let out = folder.path().join("rec.csv");
-    let output = Command::new(env!("CARGO_BIN_EXE_bowden"))
-        .current_dir(folder.path())
-        .args(["simulate", "--rig", "rig.toml", "--out", "rec.csv"])
-        .args(options)
-        .output()
-        .unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    match output.status.code() {
-        Some(0) => Ok(load(&out)),
-        status => {
+    let arguments = [&["simulate", "--rig", "rig.toml", "--out", "rec.csv"], options].concat();
+    match bowden(folder.path(), &arguments) {
+        (0, ..) => Ok(load(&out)),
+        (status, _, stderr) => {
             assert!(!out.exists(), "a refused run leaves no file");
-            Err((status.unwrap(), stderr))
+            Err((status, stderr))
         }
     }
 }

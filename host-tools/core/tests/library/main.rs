@@ -10,3 +10,6 @@ mod rig_laws;
 mod rig_points;
 mod rig_replay_keys;
 mod survey;
+
+/// Rig of a complete bench.
+const BENCH: &str = include_str!("../rigs/bench.toml");

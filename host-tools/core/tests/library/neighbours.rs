@@ -10,11 +10,11 @@ use bowden_core::rig::{Rig, RigDocument};
 use bowden_model::channel::Channel;
 use bowden_model::load::GRAVITY_M_S2;
 
+use crate::BENCH;
+
 fn model(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models").join(name)
 }
-
-const BENCH: &str = include_str!("../rigs/bench.toml");
 
 fn bench() -> RigDocument {
     RigDocument::parse(BENCH, "bench.toml").unwrap()

@@ -6,7 +6,7 @@ use bowden_core::replay::predict;
 use bowden_core::rig::{Rig, RigDocument};
 use bowden_model::channel::Channel;
 
-const BENCH: &str = include_str!("../rigs/bench.toml");
+use crate::BENCH;
 
 const POINTS: &str = r#"
 [[law]]

@@ -16,7 +16,7 @@ use bowden_core::survey::{Plan, Summary, survey};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 
-const RIG: &str = include_str!("../rigs/bench.toml");
+use crate::BENCH;
 
 /// Dry friction of the joint, which the rig file does not state.
 const STICKING: &str = "
@@ -33,7 +33,7 @@ fn record(path: &Path, changed: &[&str], seed: u64) {
 
 /// The same, with more in the rig than its file has.
 fn record_with(path: &Path, more: &str, changed: &[&str], seed: u64) {
-    let mut rig = Rig::parse(&[RIG, more].concat(), "bench.toml").unwrap();
+    let mut rig = Rig::parse(&[BENCH, more].concat(), "bench.toml").unwrap();
     for parameter in changed {
         parameter.parse::<Assignment>().unwrap().apply(&mut rig).unwrap();
     }
@@ -51,7 +51,7 @@ fn recordings() -> &'static Path {
         for bench in ["loosening", "steady"] {
             fs::create_dir(place.join(bench)).unwrap();
         }
-        fs::write(place.join("rig.toml"), RIG).unwrap();
+        fs::write(place.join("rig.toml"), BENCH).unwrap();
         for (number, pretension_n) in [(8_u64, 30.0), (9, 25.0), (10, 20.0)] {
             let changed = format!("tendon.pretension_n={pretension_n}");
             record(&place.join(format!("loosening/run-{number}.csv")), &[&changed], number);
@@ -187,7 +187,7 @@ fn tables_and_page_follow_while_a_survey_goes_on() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("recordings");
     fs::create_dir_all(&folder).unwrap();
-    fs::write(folder.join("rig.toml"), RIG).unwrap();
+    fs::write(folder.join("rig.toml"), BENCH).unwrap();
     // No recording first: without a result there is nothing to write.
     fs::write(folder.join("run-0.csv"), "").unwrap();
     for seed in [1, 2] {
@@ -226,7 +226,7 @@ fn a_survey_says_since_which_recording_a_bench_has_an_effect() {
     let place = tempfile::tempdir().unwrap();
     let [folder, out] = ["recordings", "out"].map(|name| place.path().join(name));
     fs::create_dir_all(folder.join("a")).unwrap();
-    fs::write(folder.join("rig.toml"), RIG).unwrap();
+    fs::write(folder.join("rig.toml"), BENCH).unwrap();
     for (seed, more) in [(1, ""), (2, STICKING), (3, STICKING)] {
         record_with(&folder.join(format!("a/run-{seed}.csv")), more, &[], seed);
     }
@@ -255,7 +255,7 @@ fn a_folder_of_which_nothing_can_be_diagnosed_says_the_first_reason() {
     let refuse = |plan: &Plan| survey(plan, &out, 2, &Quiet).map(|_: Summary| ()).unwrap_err();
     let failure = refuse(&Plan::new(place.path(), &[], &out).unwrap());
     assert!(failure.message().contains("no rig: name one with --rig"), "{failure}");
-    fs::write(place.path().join("rig.toml"), RIG).unwrap();
+    fs::write(place.path().join("rig.toml"), BENCH).unwrap();
     let failure = refuse(&Plan::new(place.path(), &[], &out).unwrap());
     assert!(failure.message().contains("a.csv:1: the file is empty"), "{failure}");
     let failure = Plan::new(&place.path().join("nowhere"), &[], &out).unwrap_err();
