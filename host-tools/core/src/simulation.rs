@@ -39,6 +39,16 @@ const SOFT_GUIDE: f64 = 1.5;
 /// Half width of the zero-phase filter of the guiding torque, s.
 const GUIDE_FILTER_S: f64 = 0.03;
 
+/// Which of the two passes of a guided motor are simulated; other drives have one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passes {
+    /// Both.
+    All,
+    /// The first alone, in half the time. How much a change of the joint changes its outputs is as large as with both; the
+    /// outputs themselves differ, because nothing lets the pulley give way.
+    First,
+}
+
 /// Simulates the joint with the inputs of a recording: all outputs of the model.
 ///
 /// # Errors
@@ -95,6 +105,20 @@ pub fn replay_into(
     outputs: &[Channel],
     sink: &mut impl Sink,
 ) -> Result<(), Failure> {
+    replay_passes_into(Passes::All, model, input, outputs, sink)
+}
+
+/// The same of some passes.
+///
+/// # Errors
+/// When the model cannot be driven.
+pub fn replay_passes_into(
+    passes: Passes,
+    model: &JointModel,
+    input: &ReplayInput,
+    outputs: &[Channel],
+    sink: &mut impl Sink,
+) -> Result<(), Failure> {
     let config = model.plant()?;
     let drive = model.drive()?;
     let run = Run { model, config: &config, input, drive };
@@ -102,10 +126,14 @@ pub fn replay_into(
         run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }, outputs, sink);
         return Ok(());
     }
-    let stiffness_nm_per_rad = STIFF_GUIDE * input.cables_nm_per_rad;
+    let stiff = Guide { stiffness_nm_per_rad: STIFF_GUIDE * input.cables_nm_per_rad, ahead_nm: &[] };
+    if passes == Passes::First {
+        run.execute(stiff, outputs, sink);
+        return Ok(());
+    }
     let first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
     let mut first = StoppedBy { prediction: first, sink };
-    run.execute(Guide { stiffness_nm_per_rad, ahead_nm: &[] }, &[], &mut first);
+    run.execute(stiff, &[], &mut first);
     let StoppedBy { prediction: first, sink } = first;
     if sink.is_stopped() {
         return Ok(());

@@ -5,8 +5,8 @@
 //! after a refit is estimated as `min_b |P (r + b (r_c - r))|²` with the projection `P = 1 - J (JᵀJ)⁻¹ Jᵀ`: exact for an
 //! effect that enters linearly, a ranking for the others; those that it ranks first are simulated at their estimated strength.
 //!
-//! A replay of a guided motor is simulated whole: its first pass alone misleads the ranking where a joint with play moves fast
-//! (`play_of_the_joint_is_found_in_a_fast_motion` fails with it).
+//! Of a guided motor the first pass of the replay tells what changes, in half the time. Those that rank first by that are judged again by
+//! whole replays.
 //!
 //! Where a parameter has taken the place of what is missing, as a weight that of a spring, most of what the effect changes is
 //! what parameters change too; the little by which the two differ is lost in the curvature of so long a way. Such a start is
@@ -26,7 +26,7 @@ use crate::fit::objective::{Objective, Part, Residuals};
 use crate::fit::solver::{Solution, training_rows};
 use crate::joint_model::JointModel;
 use crate::progress::Progress;
-use crate::simulation::Prediction;
+use crate::simulation::{Passes, Prediction};
 use moments::{Comparison, Span};
 
 /// Times the length of the recordings before which something has set in that has always been there: what comes on in a tenth of its
@@ -38,6 +38,12 @@ const FADES: f64 = 0.1;
 
 /// Candidates whose estimated strength is simulated, of those that the estimate ranks first.
 const VERIFIED: usize = 10;
+
+/// Candidates that are judged by whole replays, of those that first passes rank first.
+const JUDGED_AGAIN: usize = 20;
+
+/// Part of a promising gain that a candidate shows in first passes at least to be judged again.
+const NEARLY: f64 = 0.3;
 
 /// Strength, in starting strengths, below which the linear estimate is not followed, on either side for what has either
 /// sign: such an effect is hardly there.
@@ -103,19 +109,25 @@ pub struct Present<'a> {
     pub predictions: &'a [Prediction],
 }
 
-/// Ranks candidates, best first.
+/// Ranks candidates, best first; a gain is asked of them that is above `promising`.
 #[must_use]
 pub fn screen(
     objective: &Objective,
     present: &Present<'_>,
     candidates: &[Candidate],
+    promising: f64,
     progress: &dyn Progress,
 ) -> Vec<Screened> {
     let [objective, _] = &objective.split();
     let basis = Basis::new(&present.solution.slopes().jacobian);
     let rows_now = rows(objective, &present.solution.residuals);
     let now = basis.without(&rows_now);
-    let background = Background { objective, present, basis, loss_now: now.norm_squared(), now, rows_now };
+    let missing = objective
+        .residuals_in(Passes::First, &present.solution.model)
+        .map_or_else(|_| DVector::zeros(rows_now.len()), |first| &rows_now - rows(objective, &first));
+    let loss_now = now.norm_squared();
+    let background =
+        Background { objective, present, basis, passes: Passes::First, missing, loss_now, now, rows_now };
     let starts: Vec<(usize, ActiveEffect)> = candidates
         .iter()
         .enumerate()
@@ -143,6 +155,18 @@ pub fn screen(
     }
     let mut ranked: Vec<Judged> = best.into_iter().flatten().collect();
     ranked.sort_by(|a, b| b.best().gain.total_cmp(&a.best().gain));
+    let background =
+        Background { passes: Passes::All, missing: DVector::zeros(background.rows_now.len()), ..background };
+    let told_apart = |judged: &&Judged| judged.best().gain > NEARLY * promising;
+    let again = ranked.iter().take(JUDGED_AGAIN).take_while(told_apart).count();
+    ranked[..again].par_iter_mut().for_each(|judged| {
+        if !progress.interrupted()
+            && let Some(whole) = background.judge_again(judged)
+        {
+            *judged = whole;
+        }
+    });
+    ranked.sort_by(|a, b| b.best().gain.total_cmp(&a.best().gain));
     let mut screened: Vec<Screened> = ranked
         .into_par_iter()
         .enumerate()
@@ -169,6 +193,10 @@ struct Background<'a> {
     objective: &'a Objective,
     present: &'a Present<'a>,
     basis: Basis,
+    /// What is simulated of a replay.
+    passes: Passes,
+    /// What rows of these passes lack to those of whole replays, as the present model shows it.
+    missing: DVector<f64>,
     /// Residuals of the present model.
     rows_now: DVector<f64>,
     /// What the present parameters cannot take off.
@@ -206,8 +234,8 @@ impl Background<'_> {
             effect
         };
         let always = lasting(-LONG_SINCE * total_s, 2.0 * LONG_SINCE * total_s);
-        let Some(there) = self.residuals(always).filter(Residuals::is_finite) else { return Vec::new() };
-        let change = rows(self.objective, &there) - &self.rows_now;
+        let Some(there) = self.rows_of(always) else { return Vec::new() };
+        let change = there - &self.rows_now;
         let clock_s: Vec<f64> = self
             .objective
             .entries()
@@ -233,8 +261,8 @@ impl Background<'_> {
     }
 
     fn judge(&self, start: ActiveEffect) -> Option<Judged> {
-        let Self { objective, basis, now, .. } = self;
-        let there = rows(objective, &self.residuals(start).filter(Residuals::is_finite)?);
+        let Self { basis, now, .. } = self;
+        let there = self.rows_of(start)?;
         let whole_change = (&there - &self.rows_now).norm_squared();
         let inside = basis.inside(&there);
         let there = basis.without(&there);
@@ -260,8 +288,7 @@ impl Background<'_> {
                 x -= basis.steps(&too_much);
                 x.apply(|x| *x = x.clamp(-ROOM, ROOM));
                 let room = self.with_parameters_at(&x);
-                let Some(there) = self.beside(&room, start).filter(Residuals::is_finite) else { break };
-                let there = rows(objective, &there);
+                let Some(there) = self.rows_beside(&room, start) else { break };
                 let gain = gain_of(basis.without(&there).norm_squared());
                 if gain <= at_start.gain {
                     break;
@@ -271,6 +298,15 @@ impl Background<'_> {
             }
         }
         Some(Judged { start: at_start, linear })
+    }
+
+    /// What first passes have found, judged by whole replays.
+    fn judge_again(&self, judged: &Judged) -> Option<Judged> {
+        let Some(room) = &judged.start.room else { return self.judge(judged.start.start) };
+        let there = self.rows_beside(room, judged.start.start)?;
+        let gain = 1.0 - self.basis.without(&there).norm_squared() / self.loss_now.max(f64::MIN_POSITIVE);
+        let start = Screened { gain, ..judged.start.clone() };
+        Some(Judged { start, linear: judged.linear.clone() })
     }
 
     /// The start at the strength that its estimate says, where that predicts better, and so on while it asks for more than is trusted:
@@ -309,16 +345,15 @@ impl Background<'_> {
     /// such parameters keeps them; `None` for one that cannot be simulated.
     fn with_room(&self, start: &Screened) -> Option<(Screened, f64)> {
         if let Some(room) = &start.room {
-            let there = self.beside(room, start.start).filter(Residuals::is_finite)?;
-            return Some((start.clone(), rows(self.objective, &there).norm_squared()));
+            let there = self.rows_beside(room, start.start)?;
+            return Some((start.clone(), there.norm_squared()));
         }
-        let here = rows(self.objective, &self.residuals(start.start).filter(Residuals::is_finite)?);
+        let here = self.rows_of(start.start)?;
         let mut x = -self.basis.steps(&self.basis.inside(&here));
         x.apply(|x| *x = x.clamp(-ROOM, ROOM));
         let moved = [1.0, 0.5].into_iter().filter_map(|part| {
             let room = self.with_parameters_at(&(&x * part));
-            let there = self.beside(&room, start.start).filter(Residuals::is_finite)?;
-            Some((rows(self.objective, &there).norm_squared(), room))
+            Some((self.rows_beside(&room, start.start)?.norm_squared(), room))
         });
         let best = moved.min_by(|(a, _), (b, _)| a.total_cmp(b));
         let loss = here.norm_squared();
@@ -338,20 +373,25 @@ impl Background<'_> {
         model
     }
 
-    fn beside(&self, model: &JointModel, start: ActiveEffect) -> Option<Residuals> {
-        self.objective.residuals(&self.present.layout.with(model, start).1).ok()
+    /// Rows of an effect beside a model, as whole replays would show them; `None` where they cannot be simulated.
+    fn rows_beside(&self, model: &JointModel, start: ActiveEffect) -> Option<DVector<f64>> {
+        let with = self.present.layout.with(model, start).1;
+        let there = self.objective.residuals_in(self.passes, &with).ok().filter(Residuals::is_finite)?;
+        Some(rows(self.objective, &there) + &self.missing)
     }
 
-    fn residuals(&self, start: ActiveEffect) -> Option<Residuals> {
+    /// The same beside the present model.
+    fn rows_of(&self, start: ActiveEffect) -> Option<DVector<f64>> {
         let Present { solution, predictions, .. } = self.present;
         let model = &solution.model;
         // A sensor that drives nothing changes nothing but what is seen of the same motion.
         let only_seen = start.descriptor().component == Component::Sensors
             && !model.inputs.iter().any(|channel| start.target.includes(*channel));
         if only_seen {
-            self.objective.residuals_seen_through(predictions, start).ok()
+            let there = self.objective.residuals_seen_through(predictions, start).ok();
+            Some(rows(self.objective, &there.filter(Residuals::is_finite)?))
         } else {
-            self.beside(model, start)
+            self.rows_beside(model, start)
         }
     }
 }
@@ -444,7 +484,7 @@ mod tests {
         let predictions = objective.predict(&solution.model).unwrap();
         let present =
             Present { believed: model, solution: &solution, layout: &layout, predictions: &predictions };
-        let found = screen(&objective, &present, &[Candidate { starts }], &Quiet).remove(0);
+        let found = screen(&objective, &present, &[Candidate { starts }], 0.0, &Quiet).remove(0);
         (found, solution.model.clone())
     }
 

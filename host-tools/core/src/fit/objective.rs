@@ -29,7 +29,7 @@ use crate::fit::observed::{Observed, Use};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::simulation::{Prediction, ReplayInput};
+use crate::simulation::{Passes, Prediction, ReplayInput};
 pub use block::Block;
 use block::{Moments, moments_of};
 use dataset::Dataset;
@@ -327,9 +327,17 @@ impl Objective {
     /// # Errors
     /// When the model cannot be driven.
     pub fn residuals(&self, model: &JointModel) -> Result<Residuals, Failure> {
+        self.residuals_in(Passes::All, model)
+    }
+
+    /// Residuals of what some passes of the replays show of `model`.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn residuals_in(&self, passes: Passes, model: &JointModel) -> Result<Residuals, Failure> {
         let mut values = Vec::new();
         for dataset in &self.datasets {
-            self.append(dataset, &dataset.seen(model)?, &mut values);
+            self.append(dataset, &dataset.seen(model, passes)?, &mut values);
         }
         Ok(Residuals { values })
     }

@@ -58,7 +58,7 @@ impl Search<'_> {
             progress.stage("screening effects", all.iter().map(|c| c.starts.len() as u64).sum());
             let Fitted { layout, solution, .. } = present;
             let present = Present { believed: self.believed, solution, layout, predictions };
-            screen(objective, &present, all, progress)
+            screen(objective, &present, all, promising, progress)
         };
         let promising = ranked.iter().filter(|s| s.gain > promising).take(FITTED).count();
         let mut record: Vec<Attempted> =

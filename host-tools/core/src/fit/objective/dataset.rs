@@ -14,7 +14,7 @@ use crate::fit::variation::Variation;
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::simulation::{Prediction, ReplayInput, replay_into, replay_of};
+use crate::simulation::{Passes, Prediction, ReplayInput, replay_of, replay_passes_into};
 
 /// Length of a block of means, s.
 const BLOCK_S: f64 = 0.05;
@@ -78,16 +78,18 @@ impl Dataset {
         (start_s..end_s).contains(&time_s)
     }
 
-    /// Moments of what the sensors of this recording would have shown of `model`, in every series of `measured`.
-    pub(super) fn seen(&self, model: &JointModel) -> Result<Arc<Seen>, Failure> {
+    /// Moments of what the sensors of this recording would have shown of `model`, in every series of `measured`, by some passes of a
+    /// replay.
+    pub(super) fn seen(&self, model: &JointModel, passes: Passes) -> Result<Arc<Seen>, Failure> {
         let joint = self.joint(model);
-        if let Some(seen) = self.memory.recall(&joint) {
+        let passes = if joint.drive()? == Drive::GuidedMotor { passes } else { Passes::All };
+        if let Some(seen) = self.memory.recall(&joint, passes) {
             return Ok(seen);
         }
         let mut seen = Blockwise::new(self);
-        replay_into(&joint, &self.input, &self.outputs, &mut seen)?;
+        replay_passes_into(passes, &joint, &self.input, &self.outputs, &mut seen)?;
         let seen = Arc::new(seen.simulated);
-        self.memory.keep(joint.into_owned(), &seen);
+        self.memory.keep(joint.into_owned(), passes, &seen);
         Ok(seen)
     }
 

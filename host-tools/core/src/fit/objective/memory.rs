@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::block::Moments;
 use crate::joint_model::JointModel;
+use crate::simulation::Passes;
 
 /// Bytes that the replays of one recording may take, unless a single one takes more: 140 of 40 s with all channels, one of an hour.
 const BYTES: usize = 16 << 20;
@@ -17,6 +18,7 @@ pub(super) type Seen = Vec<Vec<Moments>>;
 #[derive(Debug)]
 struct Replayed {
     joint: JointModel,
+    passes: Passes,
     seen: Arc<Seen>,
 }
 
@@ -32,22 +34,22 @@ impl Clone for Memory {
 }
 
 impl Memory {
-    /// What was seen of a joint.
-    pub(super) fn recall(&self, joint: &JointModel) -> Option<Arc<Seen>> {
+    /// What was seen of a joint in these passes.
+    pub(super) fn recall(&self, joint: &JointModel, passes: Passes) -> Option<Arc<Seen>> {
         let replays = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |replayed: &&Replayed| replayed.joint == *joint;
+        let same = |replayed: &&Replayed| replayed.passes == passes && replayed.joint == *joint;
         replays.iter().rfind(same).map(|replayed| Arc::clone(&replayed.seen))
     }
 
     /// Remembers what was seen of a joint, and forgets what was seen longest ago.
-    pub(super) fn keep(&self, joint: JointModel, seen: &Arc<Seen>) {
+    pub(super) fn keep(&self, joint: JointModel, passes: Passes, seen: &Arc<Seen>) {
         let bytes = seen.iter().map(|moments| size_of_val(moments.as_slice())).sum::<usize>();
         let most = (BYTES / bytes.max(1)).max(1);
         let mut replays = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         while replays.len() >= most {
             replays.pop_front();
         }
-        replays.push_back(Replayed { joint, seen: Arc::clone(seen) });
+        replays.push_back(Replayed { joint, passes, seen: Arc::clone(seen) });
     }
 }
 
@@ -67,14 +69,16 @@ mod tests {
         let joint = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(10)).unwrap();
         let with_step = |step_s: f64| JointModel { step_s, ..joint.clone() };
         let (memory, first) = (Memory::default(), seen());
-        memory.keep(with_step(1.0), &first);
-        memory.keep(with_step(2.0), &seen());
-        memory.keep(with_step(3.0), &seen());
-        assert!(Arc::ptr_eq(&memory.recall(&with_step(1.0)).unwrap(), &first));
-        assert!(memory.recall(&with_step(4.0)).is_none());
-        assert!(memory.clone().recall(&with_step(1.0)).is_none());
-        memory.keep(with_step(4.0), &seen());
-        let kept = [1.0, 2.0, 3.0, 4.0].map(|s| memory.recall(&with_step(s)).is_some());
+        let whole = Passes::All;
+        memory.keep(with_step(1.0), whole, &first);
+        memory.keep(with_step(2.0), whole, &seen());
+        memory.keep(with_step(3.0), whole, &seen());
+        assert!(Arc::ptr_eq(&memory.recall(&with_step(1.0), whole).unwrap(), &first));
+        assert!(memory.recall(&with_step(1.0), Passes::First).is_none());
+        assert!(memory.recall(&with_step(4.0), whole).is_none());
+        assert!(memory.clone().recall(&with_step(1.0), whole).is_none());
+        memory.keep(with_step(4.0), whole, &seen());
+        let kept = [1.0, 2.0, 3.0, 4.0].map(|s| memory.recall(&with_step(s), whole).is_some());
         assert_eq!(kept, [false, true, true, true]);
     }
 }

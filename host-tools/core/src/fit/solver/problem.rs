@@ -1,6 +1,6 @@
 //! What the optimiser is told: residuals and slopes at the places it asks for.
 //!
-//! Slopes cost a simulation or two each. While a step keeps what the slopes promised, those at the new place follow from what the step
+//! Slopes cost a simulation or two each; of a guided motor, the rough ones of a coarse round the first pass alone. While a step keeps what the slopes promised, those at the new place follow from what the step
 //! itself showed (Broyden's rank-one update, C. G. Broyden, Math. Comp. 19, 1965):
 //!
 //! ```text
@@ -21,6 +21,7 @@ use super::{COARSE_STEP, Fit, left_over, spread, training_rows};
 use crate::fit::free::Free;
 use crate::fit::objective::Residuals;
 use crate::progress::Progress;
+use crate::simulation::Passes;
 
 /// Part of the promised fall of the squared residuals that a step has to keep for its slopes to be carried on.
 const KEPT: f64 = 0.25;
@@ -112,11 +113,11 @@ impl Problem<'_> {
         slopes
     }
 
-    fn residuals_at(&self, x: &DVector<f64>) -> Option<Residuals> {
+    fn residuals_at(&self, x: &DVector<f64>, passes: Passes) -> Option<Residuals> {
         if self.progress.interrupted() {
             return None;
         }
-        self.fit.objective.residuals(&self.fit.model_at(x)).ok().filter(Residuals::is_finite)
+        self.fit.objective.residuals_in(passes, &self.fit.model_at(x)).ok().filter(Residuals::is_finite)
     }
 
     /// Column `j` of `known`, whose rows end with the priors of its own parameters.
@@ -146,7 +147,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
         // After a step that was no good the optimiser goes back.
         let stood = self.stood.get_mut().unwrap_or_else(PoisonError::into_inner);
         let back = stood.as_ref().filter(|place| place.x == *x).map(|place| place.residuals.clone());
-        self.current = back.or_else(|| self.residuals_at(x));
+        self.current = back.or_else(|| self.residuals_at(x, Passes::All));
     }
 
     fn params(&self) -> DVector<f64> {
@@ -207,7 +208,10 @@ impl Problem<'_> {
 
     /// Slopes of the weighted residuals.
     pub(super) fn slopes(&self) -> Option<DMatrix<f64>> {
-        let here = self.weighted(self.current.as_ref()?, &self.x);
+        let is_fine = self.step < COARSE_STEP;
+        let passes = if is_fine { Passes::All } else { Passes::First };
+        let in_passes = |x: &DVector<f64>| Some(self.weighted(&self.residuals_at(x, passes)?, x));
+        let here = if is_fine { self.weighted(self.current.as_ref()?, &self.x) } else { in_passes(&self.x)? };
         let columns: Option<Vec<DVector<f64>>> = (0..self.fit.free.len())
             .into_par_iter()
             .map(|j| {
@@ -221,13 +225,13 @@ impl Problem<'_> {
                 let at = |step: f64| {
                     let mut x = self.x.clone();
                     x[j] += step;
-                    Some(self.weighted(&self.residuals_at(&x)?, &x))
+                    in_passes(&x)
                 };
                 let [before, ahead] =
                     [-self.step, self.step].map(|step| free.at_bound(free.value_at(self.x[j] + step)));
                 // A step ahead alone takes curvature for slope, and a valley is left half-way: in the rounds that find the place
                 // the quotient is symmetric. So it is where a moment lies too late, which only a step back changes.
-                let symmetric = self.step < COARSE_STEP || free.is_moment();
+                let symmetric = is_fine || free.is_moment();
                 if symmetric && !before && !ahead {
                     return Some((at(self.step)? - at(-self.step)?) / (2.0 * self.step));
                 }
