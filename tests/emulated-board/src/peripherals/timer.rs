@@ -32,6 +32,8 @@ pub(crate) struct Timer {
     segment_count: u64,
     /// Count without wrap up to which flags are set.
     seen: u64,
+    /// Cycle of the next flag that raises the interrupt: the core asks for it far more often than it changes.
+    due: u64,
 }
 
 impl Timer {
@@ -55,6 +57,7 @@ impl Timer {
             segment_start: 0,
             segment_count: 0,
             seen: 0,
+            due: NEVER,
         }
     }
 
@@ -123,9 +126,13 @@ impl Timer {
 
     /// Brings flags and count up to `now`.
     pub(crate) fn advance(&mut self, now: u64) {
-        if !self.runs() {
-            return;
+        if self.runs() {
+            self.follow(now);
+            self.due = self.next_flag();
         }
+    }
+
+    fn follow(&mut self, now: u64) {
         loop {
             let total = self.total(now);
             let overflow = (self.seen / self.period() + 1) * self.period();
@@ -142,6 +149,10 @@ impl Timer {
 
     /// Cycle of the next flag that raises the interrupt.
     pub(crate) fn next_event(&self) -> u64 {
+        self.due
+    }
+
+    fn next_flag(&self) -> u64 {
         if !self.runs() {
             return NEVER;
         }
@@ -189,6 +200,12 @@ impl Timer {
     /// Writes the register at `offset`.
     pub(crate) fn write(&mut self, offset: u32, value: u32, now: u64) -> Result<(), Refusal> {
         self.advance(now);
+        let written = self.store(offset, value, now);
+        self.due = self.next_flag();
+        written
+    }
+
+    fn store(&mut self, offset: u32, value: u32, now: u64) -> Result<(), Refusal> {
         match offset {
             0x00 => {
                 only("CR1", value, 0x87)?;
