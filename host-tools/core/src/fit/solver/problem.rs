@@ -1,7 +1,8 @@
 //! What the optimiser is told: residuals and slopes at the places it asks for.
 //!
-//! Slopes cost a simulation or two each; of a guided motor, the rough ones of a coarse round the first pass alone. While a step keeps what the slopes promised, those at the new place follow from what the step
-//! itself showed (Broyden's rank-one update, C. G. Broyden, Math. Comp. 19, 1965):
+//! Slopes cost a simulation or two each; of a guided motor, the rough ones of a coarse round the first pass alone. While a step keeps what
+//! the slopes promised, those at the new place follow from what the step itself showed (Broyden's rank-one update, C. G. Broyden, Math. Comp.
+//! 19, 1965):
 //!
 //! ```text
 //! J' = J + (r' - r - J s) sᵀ / (sᵀ s)
