@@ -50,6 +50,16 @@ pub enum Passes {
     First,
 }
 
+impl Passes {
+    /// What is enough to rank, and to set out by.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn roughly(model: &JointModel) -> Result<Self, Failure> {
+        Ok(if model.drive()? == Drive::GuidedMotor { Self::First } else { Self::All })
+    }
+}
+
 /// Simulates the joint with the inputs of a recording: all outputs of the model.
 ///
 /// # Errors
@@ -152,6 +162,7 @@ mod tests {
     use bowden_model::effects::CATALOGUE;
 
     use super::*;
+    use crate::recording::Recording;
     use crate::test_bench;
 
     /// What screening takes for a simulation with one more sensor effect is that simulation, bit for bit.
@@ -188,12 +199,7 @@ mod tests {
     #[test]
     fn a_weaker_joint_is_guided_as_the_strong_one_is() {
         const SHARE: f64 = 0.01;
-        let mut recording = test_bench::swung(3000);
-        let wave = |k: u32| 0.12 * (4e-3 * f64::from(k)).cos() + 0.05;
-        recording.set(Channel::Duty, (0..3000).map(wave).collect());
-        recording.set(Channel::BusVoltage, vec![24.0; 3000]);
-        let strong = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        assert_eq!(strong.drive().unwrap(), Drive::GuidedMotor);
+        let (strong, recording) = guided(3000);
         let weak = test_bench::smaller(strong.clone(), SHARE);
         let mut on_weak = recording.clone();
         on_weak.set(Channel::BusVoltage, vec![24.0 * SHARE; 3000]);
@@ -211,16 +217,22 @@ mod tests {
         assert!(same(&of_strong.guide_nm, &of_weak.guide_nm, SHARE), "guide");
     }
 
+    /// A motor with recorded duty, whose pulley swings.
+    fn guided(samples: u32) -> (JointModel, Recording) {
+        let mut recording = test_bench::swung(samples);
+        let wave = |k: u32| 0.12 * (4e-3 * f64::from(k)).cos() + 0.05;
+        recording.set(Channel::Duty, (0..samples).map(wave).collect());
+        recording.set(Channel::BusVoltage, vec![24.0; samples as usize]);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        assert_eq!(model.drive().unwrap(), Drive::GuidedMotor);
+        (model, recording)
+    }
+
     /// Of a guided joint, what a change of the sheath's friction changes in the first pass, compared with what it changes in both: the size of
     /// the part that is along it, and the share that is beside it.
     #[test]
     fn a_first_pass_shows_what_a_change_of_the_joint_changes() {
-        let mut recording = test_bench::swung(4000);
-        let wave = |k: u32| 0.12 * (4e-3 * f64::from(k)).cos() + 0.05;
-        recording.set(Channel::Duty, (0..4000).map(wave).collect());
-        recording.set(Channel::BusVoltage, vec![24.0; 4000]);
-        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        assert_eq!(model.drive().unwrap(), Drive::GuidedMotor);
+        let (model, recording) = guided(4000);
         let input = ReplayInput::new(&model, &recording).unwrap();
         let shown = |passes: Passes, model: &JointModel| {
             let mut prediction = empty(model, &input, &model.outputs).unwrap();

@@ -122,12 +122,13 @@ pub fn screen(
     let basis = Basis::new(&present.solution.slopes().jacobian);
     let rows_now = rows(objective, &present.solution.residuals);
     let now = basis.without(&rows_now);
-    let missing = objective
-        .residuals_in(Passes::First, &present.solution.model)
-        .map_or_else(|_| DVector::zeros(rows_now.len()), |first| &rows_now - rows(objective, &first));
+    let model = &present.solution.model;
+    let first_pass = (Passes::roughly(model).ok() == Some(Passes::First))
+        .then(|| objective.residuals_in(Passes::First, model).ok().filter(Residuals::is_finite))
+        .flatten();
+    let missing = first_pass.map(|first| &rows_now - rows(objective, &first));
     let loss_now = now.norm_squared();
-    let background =
-        Background { objective, present, basis, passes: Passes::First, missing, loss_now, now, rows_now };
+    let background = Background { objective, present, basis, missing, rows_now, now, loss_now };
     let starts: Vec<(usize, ActiveEffect)> = candidates
         .iter()
         .enumerate()
@@ -155,18 +156,20 @@ pub fn screen(
     }
     let mut ranked: Vec<Judged> = best.into_iter().flatten().collect();
     ranked.sort_by(|a, b| b.best().gain.total_cmp(&a.best().gain));
-    let background =
-        Background { passes: Passes::All, missing: DVector::zeros(background.rows_now.len()), ..background };
-    let told_apart = |judged: &&Judged| judged.best().gain > NEARLY * promising;
-    let again = ranked.iter().take(JUDGED_AGAIN).take_while(told_apart).count();
-    ranked[..again].par_iter_mut().for_each(|judged| {
-        if !progress.interrupted()
-            && let Some(whole) = background.judge_again(judged)
-        {
-            *judged = whole;
-        }
-    });
-    ranked.sort_by(|a, b| b.best().gain.total_cmp(&a.best().gain));
+    let is_rough = background.missing.is_some();
+    let background = Background { missing: None, ..background };
+    if is_rough {
+        let nearly = |judged: &&Judged| judged.best().gain > NEARLY * promising;
+        let again = ranked.iter().take(JUDGED_AGAIN).take_while(nearly).count();
+        ranked[..again].par_iter_mut().for_each(|judged| {
+            if !progress.interrupted()
+                && let Some(whole) = background.judge_again(judged)
+            {
+                *judged = whole;
+            }
+        });
+        ranked.sort_by(|a, b| b.best().gain.total_cmp(&a.best().gain));
+    }
     let mut screened: Vec<Screened> = ranked
         .into_par_iter()
         .enumerate()
@@ -193,10 +196,8 @@ struct Background<'a> {
     objective: &'a Objective,
     present: &'a Present<'a>,
     basis: Basis,
-    /// What is simulated of a replay.
-    passes: Passes,
-    /// What rows of these passes lack to those of whole replays, as the present model shows it.
-    missing: DVector<f64>,
+    /// What rows of first passes lack to those of whole replays, as the present model shows it; `None` where replays are simulated whole.
+    missing: Option<DVector<f64>>,
     /// Residuals of the present model.
     rows_now: DVector<f64>,
     /// What the present parameters cannot take off.
@@ -376,8 +377,13 @@ impl Background<'_> {
     /// Rows of an effect beside a model, as whole replays would show them; `None` where they cannot be simulated.
     fn rows_beside(&self, model: &JointModel, start: ActiveEffect) -> Option<DVector<f64>> {
         let with = self.present.layout.with(model, start).1;
-        let there = self.objective.residuals_in(self.passes, &with).ok().filter(Residuals::is_finite)?;
-        Some(rows(self.objective, &there) + &self.missing)
+        let passes = if self.missing.is_some() { Passes::First } else { Passes::All };
+        let there = self.objective.residuals_in(passes, &with).ok().filter(Residuals::is_finite)?;
+        let there = rows(self.objective, &there);
+        Some(match &self.missing {
+            Some(missing) => there + missing,
+            None => there,
+        })
     }
 
     /// The same beside the present model.

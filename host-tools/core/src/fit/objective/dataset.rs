@@ -82,7 +82,6 @@ impl Dataset {
     /// replay.
     pub(super) fn seen(&self, model: &JointModel, passes: Passes) -> Result<Arc<Seen>, Failure> {
         let joint = self.joint(model);
-        let passes = if joint.drive()? == Drive::GuidedMotor { passes } else { Passes::All };
         if let Some(seen) = self.memory.recall(&joint, passes) {
             return Ok(seen);
         }

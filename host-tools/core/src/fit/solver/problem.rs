@@ -210,9 +210,12 @@ impl Problem<'_> {
     /// Slopes of the weighted residuals.
     pub(super) fn slopes(&self) -> Option<DMatrix<f64>> {
         let is_fine = self.step < COARSE_STEP;
-        let passes = if is_fine { Passes::All } else { Passes::First };
+        let passes = if is_fine { Passes::All } else { Passes::roughly(&self.fit.model).ok()? };
         let in_passes = |x: &DVector<f64>| Some(self.weighted(&self.residuals_at(x, passes)?, x));
-        let here = if is_fine { self.weighted(self.current.as_ref()?, &self.x) } else { in_passes(&self.x)? };
+        let here = match passes {
+            Passes::All => self.weighted(self.current.as_ref()?, &self.x),
+            Passes::First => in_passes(&self.x)?,
+        };
         let columns: Option<Vec<DVector<f64>>> = (0..self.fit.free.len())
             .into_par_iter()
             .map(|j| {
