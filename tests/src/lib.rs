@@ -1,6 +1,7 @@
 //! What the tests across crates share: recordings of the virtual bench as bowden reads them, and where real ones lie.
 #![forbid(unsafe_code)]
 
+pub mod direct_drives;
 pub mod prove;
 pub mod recovery;
 

@@ -1,8 +1,10 @@
 //! What is simulated: parameters, effects, boundaries and the law that drives them.
 
 use bowden_model::channel::Channel;
+use bowden_model::drive::pulley_inertia_kg_m2;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
+use bowden_model::load::inertia_kg_m2;
 use bowden_model::parameters::JointParameters;
 use bowden_model::plant::{InputBoundary, OutputBoundary, PlantConfig};
 
@@ -60,6 +62,8 @@ pub struct JointModel {
     pub smoothing_s: Vec<(Channel, f64)>,
     /// Parameters with a value of their own on single benches of a study; empty for one bench.
     pub own: OwnParameters,
+    /// Recorded angle to which a torque guides a joint without tendons whose motor drives it; `None` where it runs freely, as a rig file has it.
+    pub guided_by: Option<Channel>,
 }
 
 /// How a replay drives the input side.
@@ -83,6 +87,9 @@ impl JointModel {
     pub fn drive(&self) -> Result<Drive, Failure> {
         let has = |channel| self.inputs.contains(&channel);
         let motor = self.parameters.motor.is_some();
+        if self.guided_by.is_some() {
+            return Ok(Drive::GuidedMotor);
+        }
         match (has(Channel::ThetaIn), motor && has(Channel::Duty)) {
             (true, true) if self.parameters.tendon.is_some() => Ok(Drive::GuidedMotor),
             (true, _) => Ok(Drive::Angle),
@@ -170,7 +177,33 @@ impl JointModel {
             relative_inputs: rig.relative_inputs.clone(),
             smoothing_s: rig.smoothing_s.clone(),
             own: OwnParameters::default(),
+            guided_by: None,
         })
+    }
+
+    /// The same joint as a comparison with recordings takes it. A motor without tendons, driven by its duty alone, integrates every torque that
+    /// the model lacks twice, and after seconds the angle says little of where it was lacking; where the angle is recorded, a torque guides
+    /// the joint along it, and that torque is what is compared.
+    #[must_use]
+    pub fn guided(mut self) -> Self {
+        let angles = [Channel::ThetaOut, Channel::ThetaIn];
+        if self.parameters.tendon.is_none() && self.drive() == Ok(Drive::Duty) {
+            self.guided_by = angles.into_iter().find(|angle| self.outputs.contains(angle));
+        }
+        self
+    }
+
+    /// Inertia of rotor and load about the spindle of a joint without tendons, kg·m².
+    #[must_use]
+    pub fn direct_inertia_kg_m2(&self) -> f64 {
+        let load = self.parameters.load.map_or(0.0, |load| inertia_kg_m2(&load, load.mass_kg));
+        self.parameters.motor.as_ref().map_or(0.0, pulley_inertia_kg_m2) + load
+    }
+
+    /// Channel of the angle that guides the motor or is prescribed.
+    #[must_use]
+    pub fn guiding_channel(&self) -> Channel {
+        self.guided_by.unwrap_or(Channel::ThetaIn)
     }
 }
 
@@ -189,6 +222,21 @@ mod tests {
             let refused = stiff.plant().unwrap_err();
             assert!(refused.message().contains("needs steps of"), "{parameter}: {}", refused.message());
         }
+    }
+
+    #[test]
+    fn a_motor_without_tendons_is_guided_by_the_angle_that_is_recorded() {
+        let turned = test_bench::turned(100, &[]);
+        let direct = JointModel::from_rig(&test_bench::direct_rig(), &turned).unwrap();
+        assert_eq!(direct.drive().unwrap(), Drive::Duty);
+        let guided = direct.clone().guided();
+        assert_eq!((guided.guided_by, guided.drive().unwrap()), (Some(Channel::ThetaOut), Drive::GuidedMotor));
+        let blind = JointModel { outputs: vec![Channel::MotorCurrent], ..direct.clone() };
+        assert_eq!(blind.clone().guided(), blind);
+        let mut recording = test_bench::swung(100);
+        recording.set(Channel::Duty, vec![0.0; 100]);
+        let with_tendons = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        assert_eq!(with_tendons.clone().guided(), with_tendons);
     }
 
     #[test]

@@ -6,16 +6,21 @@
 //! motor, and the second pass applies it ahead so that the guide itself can be soft. The guide pulls only where the
 //! simulated angle leaves the uncertainty of the reconstructed one.
 //!
+//! Without tendons a soft guide of a single kind keeps the joint from drifting away, see `guide`; a first pass finds the torque of the motor,
+//! in proportion to which the guide acts in the second.
+//!
 //! Compared with a prescribed low-passed angle this lets the input pulley give way to the load as the real one does;
 //! `cargo xtask bench` prints what that gains.
 
 mod delay_line;
+mod guide;
 mod input;
 mod prediction;
 mod run;
 mod sensors;
 
 use bowden_model::channel::Channel;
+use bowden_model::drive::pulley_torque_constant_nm_per_a;
 
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
@@ -26,18 +31,9 @@ pub(crate) use delay_line::DelayLine;
 pub use input::ReplayInput;
 pub use prediction::{Prediction, Sink};
 use prediction::{StoppedBy, Watched};
-use run::{Guide, Run};
+use guide::{FILTER_S, Guide};
+use run::Run;
 pub use sensors::through;
-
-/// Stiffness of the guide in the first pass over that of both tendons at the input pulley, `2 EA/L r1²`: so stiff that the
-/// angle follows.
-const STIFF_GUIDE: f64 = 4.5;
-
-/// The same in the second pass.
-const SOFT_GUIDE: f64 = 1.5;
-
-/// Half width of the zero-phase filter of the guiding torque, s.
-const GUIDE_FILTER_S: f64 = 0.03;
 
 /// Which of the two passes of a guided motor are simulated; other drives have one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +52,8 @@ impl Passes {
     /// # Errors
     /// When the model cannot be driven.
     pub fn roughly(model: &JointModel) -> Result<Self, Failure> {
-        Ok(if model.drive()? == Drive::GuidedMotor { Self::First } else { Self::All })
+        let is_long = model.drive()? == Drive::GuidedMotor && model.guided_by.is_none();
+        Ok(if is_long { Self::First } else { Self::All })
     }
 }
 
@@ -134,25 +131,30 @@ pub fn replay_passes_into(
     let drive = model.drive()?;
     let run = Run { model, config: &config, input, drive };
     if drive != Drive::GuidedMotor {
-        run.execute(Guide { stiffness_nm_per_rad: 0.0, ahead_nm: &[] }, outputs, sink);
+        run.execute(Guide::NONE, outputs, sink);
         return Ok(());
     }
-    let stiff = Guide { stiffness_nm_per_rad: STIFF_GUIDE * input.cables_nm_per_rad, ahead_nm: &[] };
+    let stiff = input.hold.first_pass();
     if passes == Passes::First {
         run.execute(stiff, outputs, sink);
         return Ok(());
     }
     let first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
     let mut first = StoppedBy { prediction: first, sink };
-    run.execute(stiff, &[], &mut first);
+    let current_a = run.execute(stiff, &[], &mut first);
     let StoppedBy { prediction: first, sink } = first;
     if sink.is_stopped() {
         return Ok(());
     }
-    let half = (GUIDE_FILTER_S / input.step_s).round() as usize;
+    if model.guided_by.is_some() {
+        let motor_nm =
+            current_a * model.parameters.motor.as_ref().map_or(0.0, pulley_torque_constant_nm_per_a);
+        run.execute(input.hold.second_pass_beside(motor_nm), outputs, sink);
+        return Ok(());
+    }
+    let half = (FILTER_S / input.step_s).round() as usize;
     let ahead_nm = moving_average(moving_average(first.guide_nm, half), half);
-    let guide = Guide { stiffness_nm_per_rad: SOFT_GUIDE * input.cables_nm_per_rad, ahead_nm: &ahead_nm };
-    run.execute(guide, outputs, sink);
+    run.execute(input.hold.second_pass(&ahead_nm), outputs, sink);
     Ok(())
 }
 

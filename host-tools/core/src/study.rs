@@ -1,6 +1,7 @@
 //! A study: recordings of one or several benches that are diagnosed, fitted or checked together.
 
 mod assemble;
+mod direct;
 mod file;
 mod joint;
 

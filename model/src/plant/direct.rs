@@ -39,7 +39,7 @@ pub(super) fn step(
     let inertia = pulley_inertia_kg_m2(parameters) + inertia_kg_m2(&load, at_joint.mass_kg);
     let drag = parameters.viscous_nm_s_per_rad + load.viscous_nm_s_per_rad;
     let response = Response::new(inertia, [drag, back_emf_drag], kick_s);
-    let torque_nm = standing_nm + load_nm + port.torque_nm;
+    let torque_nm = standing_nm + load_nm + input.input_torque_nm + port.torque_nm;
     let driven = response.after_rad_s(motor.omega_rad_s, torque_nm);
     let per_nm = response.rad_s_per_nm;
     let friction = [port.coulomb_nm, port.presliding_rad];

@@ -68,6 +68,7 @@ mod bristle;
 mod case;
 mod config;
 mod controller;
+mod direct;
 mod draw;
 mod effects;
 mod error;
@@ -83,6 +84,7 @@ mod tendon;
 
 pub use case::{Case, Parameter};
 pub use config::{BenchConfig, Bend, ControllerGains, nominal_rig_toml};
+pub use direct::{DirectBench, DirectEffect, DirectKind, DirectRecording};
 pub use effects::*;
 pub use error::BenchError;
 pub use live::{Bridge, LiveBench};

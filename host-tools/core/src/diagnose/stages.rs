@@ -18,7 +18,8 @@ const COLUMNS: usize = 5000;
 pub(crate) struct Stage {
     /// Against all recordings.
     pub residuals: Residuals,
-    /// Root mean square difference of every series on held-out data, in its unit, in the order of the scales.
+    /// Root mean square difference of every series on held-out data, in its unit, in the order of the scales: of channels from a free run, if
+    /// the joint is guided by one.
     pub heldout_rmse: Vec<f64>,
 }
 
@@ -29,7 +30,11 @@ impl Stage {
     /// When the model cannot be driven.
     pub fn of(objective: &Objective, model: &JointModel) -> Result<Self, Failure> {
         let predictions = objective.predict(model)?;
-        let rmse = |(series, _): &(Series, f64)| objective.rmse(&predictions, *series, Part::HeldOut);
+        let free = objective.predict_freely(model)?;
+        let rmse = |(series, _): &(Series, f64)| match (series, &free) {
+            (Series::Channel(_), Some(free)) => objective.rmse(free, *series, Part::HeldOut),
+            _ => objective.rmse(&predictions, *series, Part::HeldOut),
+        };
         Ok(Self {
             residuals: objective.compare(&predictions),
             heldout_rmse: objective.scales().iter().map(rmse).collect(),
@@ -67,6 +72,10 @@ impl Drawn {
     /// Every compared series.
     fn new(objective: &Objective, model: &JointModel) -> Result<Self, Failure> {
         let mut prediction = objective.predict_first(model)?;
+        if let Some(mut free) = objective.predict_first_freely(model)? {
+            free.guide_nm = prediction.guide_nm;
+            prediction = free;
+        }
         let drawn = |(series, _): &(Series, f64)| {
             let values = match series {
                 Series::Channel(channel) => prediction.take(*channel),

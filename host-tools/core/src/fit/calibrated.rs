@@ -3,7 +3,8 @@
 //!
 //! Of each product that a replay cannot tell apart one factor is moved: `μ` stands for `μ K`, `EA` for `EA / L`, the output radius
 //! for the ratio of both radii, the weight for `m l`. An arm of its own would let weight and inertia go different ways, and a spring
-//! at the joint would be taken for weight. The gear ratio is counted when a bench is built.
+//! at the joint would be taken for weight; where no tendon carries them, the torque of the motor tells both. The gear ratio is counted when a
+//! bench is built.
 
 use bowden_model::parameters::NominalParameter;
 
@@ -19,18 +20,33 @@ pub struct Calibrated {
     pub spread: f64,
     /// Relative change from which on the rig file is wrong about it, and not just by what benches usually are.
     pub wrong_from: f64,
-    /// Whether it is moved only where a replay does not follow the recorded angle of the motor.
-    pub free_running: bool,
+    /// On which joints it is moved.
+    pub of: Of,
+}
+
+/// Joints on which a parameter is moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// All that have it.
+    Every,
+    /// Those of which no input is the angle of the motor.
+    FreeRunning,
+    /// Those without tendons whose motor drives them: inertia and drag show in the torque that their motion takes.
+    Direct,
 }
 
 impl Calibrated {
     const fn new(section: &'static str, name: &'static str, spread: f64, wrong_from: f64) -> Self {
-        Self { section, name, spread, wrong_from, free_running: false }
+        Self { section, name, spread, wrong_from, of: Of::Every }
+    }
+
+    const fn of(self, of: Of) -> Self {
+        Self { of, ..self }
     }
 }
 
 /// All of them.
-pub const CALIBRATED: [Calibrated; 8] = [
+pub const CALIBRATED: [Calibrated; 12] = [
     // From a table of materials; lubrication halves it.
     Calibrated::new("sheath", "friction_coefficient", 0.5, 0.15),
     // From a data sheet of the rope, without its terminations. Contact along the sheath gives way beside it: short recordings of a
@@ -43,11 +59,18 @@ pub const CALIBRATED: [Calibrated; 8] = [
     Calibrated::new("motor", "torque_constant_nm_per_a", 0.2, 0.1),
     // Without what the gear adds, which data sheets leave out. A motor that is guided along its recorded angle shows little of it,
     // and stick and slip imitate that little.
-    Calibrated { free_running: true, ..Calibrated::new("motor", "rotor_inertia_kg_m2", 0.7, 0.3) },
+    Calibrated::new("motor", "rotor_inertia_kg_m2", 0.7, 0.3).of(Of::FreeRunning),
     // From a drawing or a caliper, without half the rope's thickness.
     Calibrated::new("pulleys", "output_radius_m", 0.02, 0.02),
     // Weighed, but not the arm that carries it.
     Calibrated::new("load", "mass_kg", 0.3, 0.1),
+    // To the centre of gravity, which a drawing of the arm alone does not show.
+    Calibrated::new("load", "arm_m", 0.1, 0.05).of(Of::Direct),
+    // From a drawing, without what is mounted on it.
+    Calibrated::new("load", "inertia_kg_m2", 0.3, 0.1).of(Of::Direct),
+    // From an earlier run of the bench: grease and temperature double it.
+    Calibrated::new("load", "viscous_nm_s_per_rad", 1.0, 0.3).of(Of::Direct),
+    Calibrated::new("motor", "viscous_nm_s_per_rad", 1.0, 0.3).of(Of::Direct),
 ];
 
 /// Standard deviation of what is believed of a nominal parameter that [`CALIBRATED`] does not list, where a bench has it for itself.

@@ -297,7 +297,7 @@ impl Objective {
             dataset.measured.iter().flat_map(move |(series, _)| {
                 let entry = move |block, aspect| Entry { series: *series, recording, block, aspect };
                 let means = dataset.blocks.iter().map(move |block| entry(*block, Aspect::Mean));
-                let flutter = dataset.flutter.iter().map(move |group| {
+                let flutter = dataset.flutter_of(*series).iter().map(move |group| {
                     let (first, last) = (dataset.blocks[group.start], dataset.blocks[group.end - 1]);
                     entry(Block { start: first.start, end: last.end, ..first }, Aspect::Flutter)
                 });
@@ -314,7 +314,23 @@ impl Objective {
         self.datasets.iter().map(|dataset| dataset.replay(model)).collect()
     }
 
+    /// The same as [`Self::predict`], with every joint running freely; `None` where one does so anyhow, or is guided by an input.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn predict_freely(&self, model: &JointModel) -> Result<Option<Vec<Prediction>>, Failure> {
+        self.datasets.iter().map(|dataset| dataset.replay_freely(model)).collect()
+    }
+
     /// The same of the first recording alone.
+    ///
+    /// # Errors
+    /// When the model cannot be driven.
+    pub fn predict_first_freely(&self, model: &JointModel) -> Result<Option<Prediction>, Failure> {
+        self.datasets.first().map_or(Ok(None), |dataset| dataset.replay_freely(model))
+    }
+
+    /// The same as [`Self::predict`] of the first recording alone.
     ///
     /// # Errors
     /// When the model cannot be driven.
@@ -387,7 +403,7 @@ impl Objective {
             let offset = Self::offset(*series, dataset, real, simulated);
             let pairs = || real.iter().zip(simulated);
             values.extend(pairs().map(|(real, simulated)| (real.mean - simulated.mean - offset) / scale));
-            for group in &dataset.flutter {
+            for group in dataset.flutter_of(*series) {
                 let blocks = (group.end - group.start) as f64;
                 let [real, simulated] = pairs()
                     .skip(group.start)

@@ -1,7 +1,7 @@
 //! What a fit of a model moves: the nominal parameters that a recalibration moves, as far as the model has them and its recordings tell
 //! of them, and those that single benches have for themselves.
 
-use super::calibrated::CALIBRATED;
+use super::calibrated::{CALIBRATED, Of};
 use super::free::Free;
 use crate::joint_model::{Drive, JointModel};
 use crate::rig::RigParameter;
@@ -18,10 +18,15 @@ pub fn recalibrated(model: &JointModel) -> Vec<Free> {
 
 /// The listed parameters that `model` has, that the recordings tell of, and that not every bench has for itself.
 fn shared(model: &JointModel) -> impl Iterator<Item = Free> + '_ {
-    let runs_freely = matches!(model.drive(), Ok(Drive::Duty | Drive::Servo));
+    let runs_freely = matches!(model.drive(), Ok(Drive::Duty | Drive::Servo)) || model.guided_by.is_some();
+    let is_moved = move |of: Of| match of {
+        Of::Every => true,
+        Of::FreeRunning => runs_freely,
+        Of::Direct => model.guided_by.is_some(),
+    };
     CALIBRATED
         .iter()
-        .filter(move |listed| runs_freely || !listed.free_running)
+        .filter(move |listed| is_moved(listed.of))
         .filter_map(|listed| Free::nominal(model, listed.section, listed.name))
         .filter(|free| {
             let place = free.place();

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
+use bowden_model::drive::pulley_stall_torque_nm;
 
+use super::guide::Hold;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::reconstruct::{Motion, moving_average};
@@ -24,9 +26,7 @@ pub struct ReplayInput {
     pub(super) start_rad: Option<f64>,
     pub(super) start_rad_s: f64,
     clock_offset_s: f64,
-    /// Stiffness of both tendons at the input pulley, as the model that the input was prepared for has it: a fit moves
-    /// the model, and the guide stays the same.
-    pub(super) cables_nm_per_rad: f64,
+    pub(super) hold: Hold,
 }
 
 impl ReplayInput {
@@ -63,23 +63,39 @@ impl ReplayInput {
                 None => values,
             }))
         };
-        let motion = take(Channel::ThetaIn)?.map(|theta| Motion::from_encoder(&t_s, &theta));
+        let guiding = match model.guided_by {
+            Some(angle) => Some(recording.shared(angle).ok_or_else(|| {
+                let (source, role) = (recording.source(), angle.role());
+                Failure::bad_input(format!(
+                    "{source}: no column for {role}, which other recordings have; map one in [recording.columns]"
+                ))
+            })?),
+            None => take(Channel::ThetaIn)?,
+        };
+        let motion = guiding.map(|theta| Motion::from_encoder(&t_s, &theta));
+        let start_rad_s = motion.as_ref().filter(|_| model.guided_by.is_some()).map_or(0.0, |m| m.omega_rad_s[0]);
         let duty = take(Channel::Duty)?;
+        let bus_v = take(Channel::BusVoltage)?;
         let theta_ref_rad = take(Channel::ThetaRef)?;
+        let driven_nm = model.parameters.motor.as_ref().map_or(0.0, |motor| {
+            let per_v = pulley_stall_torque_nm(motor) / motor.supply_v;
+            per_v * bridge_rms_v(duty.as_deref(), bus_v.as_deref(), motor.supply_v)
+        });
+        let hold = Hold::of(model, driven_nm);
         // A joint whose angle is no input is taken to stand where its reference begins, until it is told otherwise.
         let reference_rad = theta_ref_rad.as_ref().and_then(|reference| reference.first().copied());
         let start_rad = motion.as_ref().map(|m| m.theta_rad[0]).or(reference_rad);
         Ok(Self {
             motion,
             duty,
-            bus_v: take(Channel::BusVoltage)?,
+            bus_v,
             enabled: take(Channel::DriveEnable)?,
             theta_ref_rad,
             torque_out_nm: take(Channel::TorqueOut)?,
             start_rad,
-            start_rad_s: 0.0,
+            start_rad_s,
             clock_offset_s: 0.0,
-            cables_nm_per_rad: cables_nm_per_rad(model),
+            hold,
             step_s,
             t_s,
         })
@@ -115,7 +131,7 @@ impl ReplayInput {
             start_rad: self.start_rad,
             start_rad_s: self.start_rad_s,
             clock_offset_s: self.clock_offset_s,
-            cables_nm_per_rad: self.cables_nm_per_rad,
+            hold: self.hold,
         }
     }
 
@@ -142,6 +158,18 @@ impl ReplayInput {
         &self.t_s
     }
 
+    /// Torque that the guide takes for what the encoder of the angle leaves open, as a standard deviation, N·m.
+    #[must_use]
+    pub fn guide_noise_nm(&self) -> f64 {
+        self.motion.as_ref().map_or(0.0, |motion| self.hold.answer_nm(rms(&motion.std_rad)))
+    }
+
+    /// Torque of a motor without tendons by its duty, root mean square, N·m; 0 with tendons.
+    #[must_use]
+    pub fn driven_nm(&self) -> f64 {
+        self.hold.driven_nm()
+    }
+
     /// Reconstructed motion of the input pulley, if it is an input.
     #[must_use]
     pub fn motion(&self) -> Option<&Motion> {
@@ -149,12 +177,15 @@ impl ReplayInput {
     }
 }
 
-/// `2 EA/L r1²`; zero without tendons.
-fn cables_nm_per_rad(model: &JointModel) -> f64 {
-    let parameters = &model.parameters;
-    parameters.tendon.zip(parameters.pulleys).map_or(0.0, |(tendon, pulleys)| {
-        2.0 * tendon.axial_stiffness_n / tendon.length_m * pulleys.input_radius_m * pulleys.input_radius_m
-    })
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Voltage of the bridge, root mean square, V.
+fn bridge_rms_v(duty: Option<&Vec<f64>>, bus_v: Option<&Vec<f64>>, supply_v: f64) -> f64 {
+    let Some(duty) = duty else { return 0.0 };
+    let volts = duty.iter().enumerate().map(|(k, duty)| duty * bus_v.map_or(supply_v, |bus_v| bus_v[k]));
+    rms(&volts.collect::<Vec<f64>>())
 }
 
 fn median_step_s(t_s: &[f64]) -> f64 {

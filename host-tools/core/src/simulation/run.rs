@@ -10,25 +10,11 @@ use bowden_model::plant::{Plant, PlantConfig, StepInput};
 use bowden_model::transmission::Outside;
 
 use super::delay_line::DelayLine;
+use super::guide::{DEAD_BAND, Guide, LEAD};
 use super::input::ReplayInput;
 use super::prediction::Sink;
 use super::sensors::Sampler;
 use crate::joint_model::{Drive, JointModel};
-
-/// Stiffness of the guide over that of both tendons at the input pulley, `2 EA/L r1²`, on a pulley inside a play of the gear: that of the tendons or less, so that tensions there are those of a pulley
-/// that nothing turns.
-const PLAY_GUIDE: f64 = 0.6;
-
-/// Part of the angle's standard deviation within which the guide does not pull.
-const GUIDE_DEAD_BAND: f64 = 0.3;
-
-/// What holds the simulated angle to the recorded one.
-#[derive(Clone, Copy)]
-pub(super) struct Guide<'a> {
-    pub stiffness_nm_per_rad: f64,
-    /// Torque at each sample that needs no angle to be left for it; none where it is empty.
-    pub ahead_nm: &'a [f64],
-}
 
 /// A model and the recording that drives it.
 pub(super) struct Run<'a> {
@@ -39,8 +25,8 @@ pub(super) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// One pass; only `outputs` are sampled.
-    pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) {
+    /// One pass; only `outputs` are sampled. Returns the root mean square of the motor's current, A, as far as the pass came.
+    pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) -> f64 {
         let input = self.input;
         let n = input.t_s.len();
         let longest_s = self.model.step_s.min(self.config.stable_step_s());
@@ -49,23 +35,25 @@ impl Run<'_> {
         let mut theta_in_rad = |k: usize, dt_s: f64| {
             let motion = input.motion.as_ref()?;
             let mut port = SensorPort { t_s: input.clock_at_s(k), dt_s, value: motion.theta_rad[k] };
-            effects.correct(Channel::ThetaIn, &mut states, &mut port);
+            effects.correct(self.model.guiding_channel(), &mut states, &mut port);
             Some(port.value)
         };
         let mut wanted_rad = theta_in_rad(0, 0.0);
         let start_rad = wanted_rad.or(input.start_rad).unwrap_or(0.0);
         let mut plant = Plant::at_rest(self.config, start_rad, start_rad * self.ratio());
         plant.set_time_s(input.clock_at_s(0));
-        if self.drive == Drive::Duty || self.drive == Drive::Servo {
+        if self.model.guided_by.is_some() || matches!(self.drive, Drive::Duty | Drive::Servo) {
             plant.set_speed_rad_s(input.start_rad_s);
         }
         plant.settle(self.config, &self.step_input(0, start_rad));
         let mut sampler = Sampler::new(outputs, effects);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
+        // Error of the angle as the lead of the guide has it.
+        let (mut late_rad, mut current_squares) = (0.0, 0.0);
         for k in 0..n {
             if sink.is_stopped() {
-                return;
+                break;
             }
             let mut torque_sum = 0.0;
             let span_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
@@ -87,24 +75,30 @@ impl Run<'_> {
                             let band = input
                                 .motion
                                 .as_ref()
-                                .map_or(0.0, |m| GUIDE_DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
+                                .map_or(0.0, |m| DEAD_BAND * m.std_rad[k].min(m.half_count_rad));
                             // The plant stands where the step begins, and so does what it is held against: with the
                             // end of the step it would run ahead of the recording by a step.
                             let error = plant.theta_in_rad() - recorded_rad(sub - 1);
                             let beyond = error - error.clamp(-band, band);
                             if beyond != 0.0 {
-                                let stiffness_nm_per_rad = PLAY_GUIDE * input.cables_nm_per_rad;
+                                let stiffness_nm_per_rad = input.hold.loose_nm_per_rad;
                                 step.loose_pulley = Outside {
                                     torque_nm: -stiffness_nm_per_rad * beyond,
                                     stiffness_nm_per_rad,
                                 };
                             }
                             // The rotor inside a play is not measured; what the pulley does there says nothing of it.
+                            let mut shown_nm = 0.0;
                             if !plant.inside_gear_play() {
                                 let ahead_nm = guide.ahead_nm.get(k).copied().unwrap_or(0.0);
-                                step.input_torque_nm = ahead_nm - guide.stiffness_nm_per_rad * beyond;
+                                shown_nm = ahead_nm - guide.stiffness_nm_per_rad * beyond;
+                                if let Some(lead_s) = guide.lead_s {
+                                    late_rad += (beyond - late_rad) * dt_s / (lead_s + dt_s);
+                                    shown_nm -= guide.stiffness_nm_per_rad * LEAD * (beyond - late_rad);
+                                }
+                                step.input_torque_nm = shown_nm / guide.shown;
                             }
-                            torque_sum += step.input_torque_nm / steps;
+                            torque_sum += shown_nm / steps;
                         }
                         Drive::Servo => {
                             if let (Some(servo), Some(reference)) = (self.model.servo, &input.theta_ref_rad) {
@@ -119,9 +113,11 @@ impl Run<'_> {
                     plant.step(self.config, &step, dt_s);
                 }
             }
+            current_squares += plant.current_a() * plant.current_a();
             let outputs = sampler.sample(self.config, &plant, duty, (input.clock_at_s(k), span_s));
             sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
         }
+        (current_squares / n as f64).sqrt()
     }
 
     fn ratio(&self) -> f64 {

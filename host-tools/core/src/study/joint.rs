@@ -3,7 +3,7 @@
 use bowden_model::channel::Channel;
 
 use super::{Bench, Role, Study, StudyRecording};
-use crate::fit::calibrated::{CALIBRATED, Calibrated};
+use crate::fit::calibrated::{CALIBRATED, Calibrated, Of};
 use crate::fit::observed::{Observed, Use};
 use crate::fit::variation::Variation;
 use crate::joint_model::{JointModel, OwnParameter, OwnParameters};
@@ -36,7 +36,9 @@ impl Study {
                 .all(|bench| values.iter().any(|own| own.bench == bench && own.parameter == *parameter))
         };
         let everywhere = RigParameter::nominal().filter(on_every_bench).collect();
-        let untold = self.untold_pretension(&joint);
+        let mut untold = self.untold_pretension(&joint);
+        let mut fitted = self.recordings_as(Role::Training).chain(self.recordings_as(Role::Experiment));
+        untold.extend(super::direct::untold(&joint, &mut fitted));
         joint.own = OwnParameters { values, everywhere, untold };
         Ok(joint)
     }
@@ -105,7 +107,7 @@ impl Study {
         for assignment in &listed.set {
             assignment.apply(&mut rig)?;
         }
-        let base = JointModel::from_rig(&rig, &listed.recording)?;
+        let base = JointModel::from_rig(&rig, &listed.recording)?.guided();
         let set = listed.set.iter().map(|assignment| assignment.parameter).collect();
         Ok(Variation::new(base, listed.bench, joint, self.kept_by(bench), set))
     }
@@ -115,13 +117,14 @@ impl Study {
         let listed = self.recordings.iter().find(|listed| listed.bench == bench).ok_or_else(|| {
             Failure::bad_input(format!("bench `{}` has no recording; add one", self.benches[bench].name))
         })?;
-        JointModel::from_rig(&self.benches[bench].rig, &listed.recording)
+        Ok(JointModel::from_rig(&self.benches[bench].rig, &listed.recording)?.guided())
     }
 
     /// Parameters that a fit moves on this bench by itself.
     fn fitted_on(&self, bench: &Bench) -> Vec<RigParameter> {
         let mut fitted = bench.own.clone();
-        for Calibrated { section, name, .. } in CALIBRATED {
+        let is_moved = |of: Of| of != Of::Direct || bench.rig.joint.tendon.is_none();
+        for Calibrated { section, name, .. } in CALIBRATED.into_iter().filter(|listed| is_moved(listed.of)) {
             if let Ok(parameter) = RigParameter::parse(&format!("{section}.{name}"))
                 && self.is_stated_differently(&parameter)
                 && parameter.get(&bench.rig).is_some()

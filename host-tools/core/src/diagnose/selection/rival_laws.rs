@@ -247,6 +247,21 @@ mod tests {
         assert!((name.effect.parameters[0] - 2.0).abs() < 0.02, "{:?}", name.effect);
     }
 
+    /// Rotor and joint of a joint without tendons are one body: whatever beside them takes off, friction is as likely of the one as of the other.
+    #[test]
+    fn without_tendons_friction_of_the_motor_is_as_likely_as_of_the_joint() {
+        let recording = test_bench::turned(2, &[]);
+        let direct = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap();
+        let odds = |model: &JointModel, rival: &str| {
+            let rival = Tried { effect: named(rival), model: model.clone(), loss: 1.4 };
+            chosen(named("joint_coulomb_friction"), model).odds_of(&rival)
+        };
+        assert_eq!(odds(&direct, "motor_coulomb_friction"), 1.0);
+        assert!(odds(&direct, "motor_viscous_friction") < 0.05);
+        let tendons = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
+        assert!(odds(&tendons, "motor_coulomb_friction") < 0.05);
+    }
+
     /// By hand, for one parameter against two at equal losses: (1.06 / 0.85 / 1.03)^-10 = 0.148; against a further effect 1.
     #[test]
     fn a_law_has_lower_prior_odds_than_a_name() {

@@ -46,7 +46,7 @@ pub(super) struct Dataset {
     pub(super) moments: Vec<Vec<Moments>>,
     pub(super) blocks: Vec<Block>,
     /// Groups of consecutive blocks, as ranges into `blocks`.
-    pub(super) flutter: Vec<Range<usize>>,
+    flutter: Vec<Range<usize>>,
     /// Tensions that stood at the lower end of their amplifier.
     pub(super) cut_at_zero: Vec<Channel>,
     /// Of these inputs, outputs and blocks, of which only the use may change after the first replay.
@@ -60,6 +60,13 @@ impl Dataset {
             Some(variation) => Cow::Owned(variation.apply(model)),
             None => Cow::Borrowed(model),
         }
+    }
+
+    /// Groups of blocks over which the flutter of a series is compared. Of what guides a joint without tendons it is the answer to single counts
+    /// of the encoder, and says nothing of the joint.
+    pub(super) fn flutter_of(&self, series: Series) -> &[Range<usize>] {
+        let says_nothing = series == Series::Guide && self.input.driven_nm() > 0.0;
+        if says_nothing { &[] } else { &self.flutter }
     }
 
     /// Whether anything is fitted to it.
@@ -99,6 +106,16 @@ impl Dataset {
             self.cut(channel, values);
         }
         Ok(prediction)
+    }
+
+    /// The same without a guide; `None` where nothing guides it but what its inputs name.
+    pub(super) fn replay_freely(&self, model: &JointModel) -> Result<Option<Prediction>, Failure> {
+        let joint = self.joint(model);
+        if joint.guided_by.is_none() {
+            return Ok(None);
+        }
+        let free = JointModel { guided_by: None, ..joint.into_owned() };
+        replay_of(&free, &self.input, &self.outputs).map(Some)
     }
 
     /// What an amplifier shows that stands at its end.

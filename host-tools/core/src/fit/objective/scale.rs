@@ -62,7 +62,17 @@ pub(super) fn scale_of(model: &JointModel, series: Series, noise_variance: f64, 
         Series::Guide => {
             // Of the stall torque of the motor: what a gear loses unnoticed.
             const SHARE: f64 = 0.0015;
-            SHARE * model.parameters.motor.map_or(1.0, |motor| pulley_stall_torque_nm(&motor))
+            let Some(motor) = &model.parameters.motor else { return SHARE };
+            let stall_nm = pulley_stall_torque_nm(motor);
+            if model.guided_by.is_none() {
+                return SHARE * stall_nm;
+            }
+            // A source of torque has no stall torque that means anything: of the torque that drove the joint, as of any other channel.
+            let fitted = datasets.iter().filter(|dataset| dataset.is_fitted());
+            let [driven_nm, noise_nm] = fitted
+                .map(|dataset| [dataset.input.driven_nm(), dataset.input.guide_noise_nm()])
+                .fold([0.0_f64; 2], |most, one| [most[0].max(one[0]), most[1].max(one[1])]);
+            f64::hypot(MODEL_FLOOR * driven_nm, noise_nm).max(f64::MIN_POSITIVE)
         }
         Series::Channel(channel) => {
             let floor = match channel {
