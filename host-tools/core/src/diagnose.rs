@@ -19,6 +19,7 @@ mod law_candidates;
 mod layout;
 mod locked;
 mod off_centre;
+mod one_body;
 mod onset;
 mod place;
 pub mod policy;
@@ -445,6 +446,9 @@ impl Case<'_> {
                 continue;
             }
             let separate = |tried: &Tried| {
+                if one_body::are_one(&tried.model, &active, &tried.effect) {
+                    return Some(one_body::INSEPARABLE.to_owned());
+                }
                 let found = experiment::separating(rig, chosen, tried, &bearable, clock_s)?;
                 let words = found.in_words();
                 experiments.push(found);
@@ -479,6 +483,7 @@ impl Case<'_> {
                     recalibrated_rmse: stages.recalibrated.heldout_rmse[place],
                     after_rmse: stages.after.heldout_rmse[place],
                     noise_rmse: judge.noise_variance(*series).sqrt(),
+                    free_run: model.guided_by.is_some() && *series != Series::Guide,
                 };
                 (series.name().to_owned(), fit)
             })

@@ -1,4 +1,5 @@
-//! `cargo xtask prove`: the concealed-effects benchmark of the diagnosis, and with `--real` recordings of real benches.
+//! `cargo xtask prove`: the concealed-effects benchmark of the diagnosis, and with `--real` recordings of real
+//! benches, with `--direct` joints without tendons.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,10 @@ pub struct Options {
     /// `prove --real --help` lists what else can be given
     #[arg(long)]
     real: bool,
+    /// Hide effects in joints without tendons instead, and print what is said of each; comes first. `prove --direct --help` lists what
+    /// else can be given
+    #[arg(long, conflicts_with = "real")]
+    direct: bool,
     /// With --real: folder of the data sets, instead of ../shared/data
     #[arg(long, value_name = "DIR", requires = "real")]
     data: Option<PathBuf>,
@@ -38,8 +43,13 @@ pub fn run(options: &Options) -> Result<(), String> {
     if options.real {
         return run_real(options);
     }
-    if options.handed_on.iter().any(|option| option == "--real") {
-        return Err("--real comes first: `cargo xtask prove --real ...`".to_owned());
+    if options.direct {
+        return run_direct(options);
+    }
+    for kind in ["--real", "--direct"] {
+        if options.handed_on.iter().any(|option| option == kind) {
+            return Err(format!("{kind} comes first: `cargo xtask prove {kind} ...`"));
+        }
     }
     let programs = ["--package", "bowden", "--package", "bowden-tests", "--bin", "bowden", "--bin", "prove"];
     process::run(cargo(&["build", "--release"]).args(programs), &[0])?;
@@ -51,6 +61,17 @@ pub fn run(options: &Options) -> Result<(), String> {
     } else {
         Err(format!("prove ended with {status}; what it says above tells why"))
     }
+}
+
+/// Hides effects in joints without tendons.
+///
+/// # Errors
+/// When something cannot be built, or a diagnosis fails.
+fn run_direct(options: &Options) -> Result<(), String> {
+    let program = ["--package", "bowden-tests", "--bin", "direct_drives"];
+    process::run(cargo(&["build", "--release"]).args(program), &[0])?;
+    let mut command = Command::new(built("release", "direct_drives")?);
+    process::run(command.args(&options.handed_on), &[0])
 }
 
 /// Scores and diagnoses recordings of real benches.
@@ -153,6 +174,9 @@ mod tests {
         assert!(!reason.contains('\n'));
         let reason = run(&parsed(&["--quick", "--real"])).unwrap_err();
         assert!(reason.starts_with("--real comes first"), "{reason}");
+        assert!(parsed(&["--direct", "--seed", "3"]).direct);
+        let reason = run(&parsed(&["--quick", "--direct"])).unwrap_err();
+        assert!(reason.starts_with("--direct comes first"), "{reason}");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use bowden_model::effects::CATALOGUE;
 use bowden_model::search::Starts;
 
 use super::locked::locked_start;
+use super::one_body;
 use super::onset::moment_of;
 use crate::fit::objective::{Objective, Series};
 use crate::fit::typical::sized;
@@ -44,7 +45,7 @@ pub fn candidates(
         // On a rig whose friction is distributed already, an effect that distributes it changes nothing.
         let redundant = effect.friction_law() == Some(model.parameters.friction);
         let unasked = effect.on_request() && !asked.contains(&descriptor.id);
-        if unasked || redundant || !fits(model, descriptor.component) {
+        if unasked || redundant || one_body::has(model, effect) || !fits(model, descriptor.component) {
             continue;
         }
         for target in targets(model, effect) {

@@ -21,13 +21,14 @@ mod trying;
 
 use std::cmp::Ordering;
 
-use bowden_model::effect::{ActiveEffect, Component, ParameterSpec};
+use bowden_model::effect::{ActiveEffect, ParameterSpec};
 use bowden_model::effects::find;
 use bowden_model::law;
 
 use super::hypotheses::Asked;
 use super::layout::{Layout, largest_ordinary};
 use super::locked::too_little_travel;
+use super::one_body;
 use super::onset::moment_of;
 use super::policy::{POLICY, Policy};
 use crate::fit::objective::{Objective, Part, StretchLosses};
@@ -123,7 +124,7 @@ impl Chosen {
     /// Without tendons rotor and joint are one body: an effect of the one is as likely as the same effect of the other, whatever the small
     /// effects that stand beside them take off.
     pub fn odds_of(&self, rival: &Tried) -> f64 {
-        if rival.model.parameters.tendon.is_none() && is_of_the_other_end(&self.effect, &rival.effect) {
+        if one_body::are_one(&rival.model, &self.effect, &rival.effect) {
             return 1.0;
         }
         let is_law = law::of(&rival.effect).is_some();
@@ -447,18 +448,6 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
     for place in places.iter().rev() {
         chosen.remove(*place);
     }
-}
-
-/// Whether one is of the motor what the other is of the joint.
-fn is_of_the_other_end(one: &ActiveEffect, other: &ActiveEffect) -> bool {
-    let ends = [Component::Motor, Component::Joint];
-    let at = |effect: &ActiveEffect| {
-        let descriptor = effect.descriptor();
-        let name = ends.contains(&descriptor.component).then(|| descriptor.component.name())?;
-        Some((descriptor.component, descriptor.id.strip_prefix(name)?))
-    };
-    matches!((at(one), at(other)), (Some((at_one, of_one)), Some((at_other, of_other)))
-        if at_one != at_other && of_one == of_other)
 }
 
 /// The effect of the catalogue that remains of a negligible one, if any.

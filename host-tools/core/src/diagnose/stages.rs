@@ -29,14 +29,12 @@ impl Stage {
     /// # Errors
     /// When the model cannot be driven.
     pub fn of(objective: &Objective, model: &JointModel) -> Result<Self, Failure> {
-        let predictions = objective.predict(model)?;
-        let free = objective.predict_freely(model)?;
-        let rmse = |(series, _): &(Series, f64)| match (series, &free) {
-            (Series::Channel(_), Some(free)) => objective.rmse(free, *series, Part::HeldOut),
-            _ => objective.rmse(&predictions, *series, Part::HeldOut),
-        };
+        let mut predictions = objective.predict(model)?;
+        let residuals = objective.compare(&predictions);
+        objective.run_freely(model, &mut predictions)?;
+        let rmse = |(series, _): &(Series, f64)| objective.rmse(&predictions, *series, Part::HeldOut);
         Ok(Self {
-            residuals: objective.compare(&predictions),
+            residuals,
             heldout_rmse: objective.scales().iter().map(rmse).collect(),
         })
     }
@@ -72,10 +70,7 @@ impl Drawn {
     /// Every compared series.
     fn new(objective: &Objective, model: &JointModel) -> Result<Self, Failure> {
         let mut prediction = objective.predict_first(model)?;
-        if let Some(mut free) = objective.predict_first_freely(model)? {
-            free.guide_nm = prediction.guide_nm;
-            prediction = free;
-        }
+        objective.run_freely(model, std::slice::from_mut(&mut prediction))?;
         let drawn = |(series, _): &(Series, f64)| {
             let values = match series {
                 Series::Channel(channel) => prediction.take(*channel),

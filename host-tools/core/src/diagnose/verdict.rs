@@ -311,6 +311,9 @@ pub struct ChannelFit {
     pub after_rmse: f64,
     /// What sensors alone would leave.
     pub noise_rmse: f64,
+    /// Whether it is of a free run over the whole recording, beside a diagnosis that held the joint to its recorded angle.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub free_run: bool,
 }
 
 /// Scores on data that the fit did not see.

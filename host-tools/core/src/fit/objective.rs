@@ -314,20 +314,19 @@ impl Objective {
         self.datasets.iter().map(|dataset| dataset.replay(model)).collect()
     }
 
-    /// The same as [`Self::predict`], with every joint running freely; `None` where one does so anyhow, or is guided by an input.
+    /// Replaces the channels of `predictions`, those of `model`, by what a free run shows, where the joint was guided by a channel that is
+    /// compared: what a user will simulate. The guiding torque stays.
     ///
     /// # Errors
     /// When the model cannot be driven.
-    pub fn predict_freely(&self, model: &JointModel) -> Result<Option<Vec<Prediction>>, Failure> {
-        self.datasets.iter().map(|dataset| dataset.replay_freely(model)).collect()
-    }
-
-    /// The same of the first recording alone.
-    ///
-    /// # Errors
-    /// When the model cannot be driven.
-    pub fn predict_first_freely(&self, model: &JointModel) -> Result<Option<Prediction>, Failure> {
-        self.datasets.first().map_or(Ok(None), |dataset| dataset.replay_freely(model))
+    pub fn run_freely(&self, model: &JointModel, predictions: &mut [Prediction]) -> Result<(), Failure> {
+        for (dataset, prediction) in self.datasets.iter().zip(predictions) {
+            if let Some(free) = dataset.replay_freely(model)? {
+                let guide_nm = std::mem::take(&mut prediction.guide_nm);
+                *prediction = Prediction { guide_nm, ..free };
+            }
+        }
+        Ok(())
     }
 
     /// The same as [`Self::predict`] of the first recording alone.

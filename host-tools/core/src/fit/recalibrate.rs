@@ -113,9 +113,14 @@ pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibrati
     let mut free = recalibrated(model);
     free.extend((0..model.effects.len()).flat_map(|effect| own_of_effect(model, effect)));
     progress.stage("recalibrating", 0);
-    let before = objective.predict(model)?;
+    let shown = |model: &JointModel| {
+        let mut predictions = objective.predict(model)?;
+        objective.run_freely(model, &mut predictions)?;
+        Ok::<_, Failure>(predictions)
+    };
+    let before = shown(model)?;
     let solution = solve_watched(objective, model, &free, PATIENCE, progress)?;
-    let after = objective.predict(&solution.model)?;
+    let after = shown(&solution.model)?;
     progress.stage("what the recordings can tell apart", 0);
     let sensitivity = Sensitivity::of(objective, &solution.model)?;
 

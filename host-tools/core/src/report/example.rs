@@ -121,6 +121,7 @@ fn diagnosis() -> Diagnosis {
             recalibrated_rmse: 0.55 * before_rmse,
             after_rmse: 0.08 * before_rmse,
             noise_rmse: 0.07 * before_rmse,
+            free_run: false,
         };
         (channel.to_owned(), fit)
     });

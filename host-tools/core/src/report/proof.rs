@@ -27,6 +27,9 @@ pub(super) fn section(findings: &Findings) -> Markup {
                         "Root mean square difference between recording and simulation on " (data)
                         ": with the rig file as it was, recalibrated, and with the diagnosed physics. "
                         "The noise floor is what the sensors alone would leave."
+                        @if fit.channels.values().any(|rmse| rmse.free_run) {
+                            " A free run follows the torque alone over the whole recording, so that errors add up; the plots by regime, position,                              speed and time are of the joint held to its recorded angle, as the diagnosis compared it."
+                        }
                         (key(true))
                     }
                     thead { tr {
@@ -45,7 +48,10 @@ pub(super) fn section(findings: &Findings) -> Markup {
                             figures::shared_exponent(longest(stages.into_iter().chain([rmse.noise_rmse])));
                         @let scaled = |value: f64| figures::number(value / 10_f64.powi(exponent));
                         tr {
-                            th scope="row" { (names::channel(name)) " " code { (name) } }
+                            th scope="row" {
+                                (names::channel(name)) " " code { (name) }
+                                @if rmse.free_run { ", free run" }
+                            }
                             td { (figures::scaled_unit(exponent, names::unit_of(findings, name))) }
                             @for stage in stages { td.number { (scaled(stage)) } }
                             td.number { (scaled(rmse.noise_rmse)) }

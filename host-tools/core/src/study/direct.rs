@@ -22,13 +22,12 @@ const SPEED_OVER_S: f64 = 0.1;
 /// - The arm where an inertia is stated beside the weight, or no weight: two numbers decide what a motion takes.
 /// - The resistance where no current is recorded: it is the torque of the duty.
 /// - The torque constant where another drag takes up its back-EMF, or nothing turns fast enough to show it.
-pub(super) fn untold<'r>(
+pub(super) fn untold(
     joint: &JointModel,
-    fitted: &mut dyn Iterator<Item = &'r Recording>,
+    fitted: &[&Recording],
 ) -> Vec<RigParameter> {
     let Some(angle) = joint.guided_by else { return Vec::new() };
     let (Some(motor), load) = (joint.parameters.motor, joint.parameters.load) else { return Vec::new() };
-    let fitted: Vec<&Recording> = fitted.collect();
     let mut untold: Vec<RigParameter> = [
         "load.mass_kg",
         "load.inertia_kg_m2",

@@ -37,8 +37,8 @@ impl Study {
         };
         let everywhere = RigParameter::nominal().filter(on_every_bench).collect();
         let mut untold = self.untold_pretension(&joint);
-        let mut fitted = self.recordings_as(Role::Training).chain(self.recordings_as(Role::Experiment));
-        untold.extend(super::direct::untold(&joint, &mut fitted));
+        let fitted = self.recordings_as(Role::Training).chain(self.recordings_as(Role::Experiment));
+        untold.extend(super::direct::untold(&joint, &fitted.collect::<Vec<_>>()));
         joint.own = OwnParameters { values, everywhere, untold };
         Ok(joint)
     }

@@ -234,6 +234,8 @@ class ChannelFit:
     after_rmse: float
     noise_rmse: float
     """What sensors alone would leave."""
+    free_run: bool = False
+    """Whether it is of a free run over the whole recording, beside a diagnosis that held the joint to its recorded angle."""
 
 
 @dataclass(frozen=True)

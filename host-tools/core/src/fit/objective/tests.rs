@@ -27,6 +27,39 @@ fn a_replay_compared_as_it_runs_is_compared_as_a_whole() {
     assert!(as_it_runs.values.iter().any(|value| value.abs() > 1.0));
 }
 
+/// A fit compares a joint without tendons where it is held to its recorded angle. What is shown of it is what a replay simulates that begins
+/// where the recording does.
+#[test]
+fn of_a_joint_that_is_held_a_free_run_is_shown() {
+    let friction = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap()).with("torque_nm", 0.1);
+    let recording = test_bench::turned(3000, &[friction]);
+    let free = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap();
+    let held = free.clone().guided();
+    let objective = Objective::new(&held, std::slice::from_ref(&recording), &[], true).unwrap();
+    let rmse = |shown: &[Prediction]| {
+        objective.rmse(shown, Series::Channel(Channel::ThetaOut), Part::Training)
+    };
+    let mut predictions = objective.predict(&held).unwrap();
+    let when_held = rmse(&predictions);
+    let guide_nm = predictions[0].guide_nm.clone();
+    objective.run_freely(&held, &mut predictions).unwrap();
+    assert_eq!(predictions[0].guide_nm, guide_nm);
+    let mut input = ReplayInput::new(&free, &recording).unwrap();
+    let motion = objective.input(0).motion().unwrap();
+    input.start_at(motion.theta_rad[0], motion.omega_rad_s[0]);
+    let replayed = replay(&free, &input).unwrap();
+    assert_eq!(predictions[0].channel(Channel::ThetaOut), replayed.channel(Channel::ThetaOut));
+    let when_free = rmse(&predictions);
+    assert!(when_free > 2.0 * when_held, "{when_held} and {when_free} rad");
+    // With tendons nothing is replaced.
+    let tendons = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(500)).unwrap();
+    let objective = Objective::new(&tendons, &[test_bench::swung(500)], &[], true).unwrap();
+    let mut predictions = objective.predict(&tendons).unwrap();
+    let before = predictions.clone();
+    objective.run_freely(&tendons, &mut predictions).unwrap();
+    assert_eq!(predictions, before);
+}
+
 /// What was not measured is not compared, but a winding heats whether its current was recorded or not.
 #[test]
 fn of_what_was_not_measured_the_current_alone_is_predicted() {
