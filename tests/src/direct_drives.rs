@@ -1,6 +1,8 @@
 //! Joints without tendons, whose motor is a source of torque: what is hidden in them, and what a diagnosis says.
 
 use std::fmt::Write as _;
+use std::path::Path;
+use std::{fs, io};
 
 use bowden_core::diagnose::diagnose;
 use bowden_core::diagnose::verdict::{Diagnosis, FoundLaw, NamedEffect, Verdict};
@@ -41,6 +43,30 @@ pub fn cases() -> Vec<Vec<DirectKind>> {
     singles.chain(pairs.into_iter().map(Vec::from)).chain(nothing).collect()
 }
 
+/// The recording that is learned from, and that of another motion.
+fn recordings(bench: &DirectBench, seed: u64) -> [DirectRecording; 2] {
+    [bench.record(TRAINING_S, seed), bench.record(HELDOUT_S, seed ^ 0x6865_6c64)]
+}
+
+/// Writes the files of a joint into a folder, which is made: rig file, `train.csv` and `heldout.csv`.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write(seed: u64, hidden: &[DirectKind], folder: &Path) -> io::Result<()> {
+    let bench = DirectBench::drawn(seed, hidden);
+    fs::create_dir_all(folder)?;
+    fs::write(folder.join("rig.toml"), bench.believed_rig(seed))?;
+    for (name, recorded) in ["train.csv", "heldout.csv"].iter().zip(recordings(&bench, seed)) {
+        let mut text = "t_s,theta_rad,torque_nm\n".to_owned();
+        let rows = recorded.t_s.iter().zip(&recorded.theta_rad).zip(&recorded.torque_nm);
+        for ((t_s, theta_rad), torque_nm) in rows {
+            let _ = writeln!(text, "{t_s:.3},{theta_rad:.9},{torque_nm:.9}");
+        }
+        fs::write(folder.join(name), text)?;
+    }
+    Ok(())
+}
+
 /// Draws a joint, records it, and diagnoses the recordings.
 ///
 /// # Errors
@@ -48,9 +74,8 @@ pub fn cases() -> Vec<Vec<DirectKind>> {
 pub fn examine(seed: u64, hidden: &[DirectKind]) -> Result<Examined, Failure> {
     let bench = DirectBench::drawn(seed, hidden);
     let rig = Rig::parse(&bench.believed_rig(seed), "rig.toml")?;
-    let recorded = |seconds, seed, name| recording(&bench.record(seconds, seed), name);
-    let training = recorded(TRAINING_S, seed, "train");
-    let heldout = recorded(HELDOUT_S, seed ^ 0x6865_6c64, "heldout");
+    let [training, heldout] = recordings(&bench, seed);
+    let [training, heldout] = [recording(&training, "train"), recording(&heldout, "heldout")];
     let study = Study::of_bench(rig, vec![training], vec![heldout]);
     let diagnosis = diagnose(&study, &[], &Quiet)?.findings.diagnosis;
     Ok(Examined { hidden: hidden.to_vec(), bench, diagnosis })

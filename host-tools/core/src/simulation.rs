@@ -6,8 +6,7 @@
 //! motor, and the second pass applies it ahead so that the guide itself can be soft. The guide pulls only where the
 //! simulated angle leaves the uncertainty of the reconstructed one.
 //!
-//! Without tendons a soft guide of a single kind keeps the joint from drifting away, see `guide`; a first pass finds the torque of the motor,
-//! in proportion to which the guide acts in the second.
+//! Without tendons a soft guide keeps the joint from drifting away in a single pass, see `guide`.
 //!
 //! Compared with a prescribed low-passed angle this lets the input pulley give way to the load as the real one does;
 //! `cargo xtask bench` prints what that gains.
@@ -20,7 +19,6 @@ mod run;
 mod sensors;
 
 use bowden_model::channel::Channel;
-use bowden_model::drive::pulley_torque_constant_nm_per_a;
 
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
@@ -134,6 +132,10 @@ pub fn replay_passes_into(
         run.execute(Guide::NONE, outputs, sink);
         return Ok(());
     }
+    if model.guided_by.is_some() {
+        run.execute(input.hold.only_pass(model), outputs, sink);
+        return Ok(());
+    }
     let stiff = input.hold.first_pass();
     if passes == Passes::First {
         run.execute(stiff, outputs, sink);
@@ -141,15 +143,9 @@ pub fn replay_passes_into(
     }
     let first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
     let mut first = StoppedBy { prediction: first, sink };
-    let current_a = run.execute(stiff, &[], &mut first);
+    run.execute(stiff, &[], &mut first);
     let StoppedBy { prediction: first, sink } = first;
     if sink.is_stopped() {
-        return Ok(());
-    }
-    if model.guided_by.is_some() {
-        let motor_nm =
-            current_a * model.parameters.motor.as_ref().map_or(0.0, pulley_torque_constant_nm_per_a);
-        run.execute(input.hold.second_pass_beside(motor_nm), outputs, sink);
         return Ok(());
     }
     let half = (FILTER_S / input.step_s).round() as usize;

@@ -58,18 +58,18 @@ impl Guide<'_> {
 /// How firmly the joint is held, by the model that an input was prepared for: a fit moves the model, and the guide stays the same.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hold {
-    /// Stiffness in the first and in the second pass, N·m/rad.
+    /// Stiffness in the first and in the second pass, N·m/rad; a joint without tendons has one pass.
     passes_nm_per_rad: [f64; 2],
     lead_s: Option<f64>,
     /// Stiffness on a pulley inside a play of the gear, N·m/rad.
     pub loose_nm_per_rad: f64,
-    /// Torque of a motor without tendons by its duty, root mean square, N·m.
-    driven_nm: Option<f64>,
+    /// Inertia of a joint without tendons, kg·m².
+    direct_kg_m2: Option<f64>,
 }
 
 impl Hold {
-    /// Of `model`, whose motor would stall at `driven_nm` under the recorded duty, root mean square.
-    pub fn of(model: &JointModel, driven_nm: f64) -> Self {
+    /// Of `model`.
+    pub fn of(model: &JointModel) -> Self {
         let parameters = &model.parameters;
         if let Some((tendon, pulleys)) = parameters.tendon.zip(parameters.pulleys) {
             // `2 EA/L r1²`.
@@ -80,7 +80,7 @@ impl Hold {
                 passes_nm_per_rad: [STIFF_GUIDE * cables_nm_per_rad, SOFT_GUIDE * cables_nm_per_rad],
                 lead_s: None,
                 loose_nm_per_rad: PLAY_GUIDE * cables_nm_per_rad,
-                driven_nm: None,
+                direct_kg_m2: None,
             };
         }
         let inertia_kg_m2 = model.direct_inertia_kg_m2();
@@ -89,11 +89,11 @@ impl Hold {
             passes_nm_per_rad: [inertia_kg_m2 * held_rad_s * held_rad_s; 2],
             lead_s: Some(2.0 / (LEAD * held_rad_s)),
             loose_nm_per_rad: 0.0,
-            driven_nm: Some(driven_nm).filter(|driven_nm| *driven_nm > 0.0),
+            direct_kg_m2: Some(inertia_kg_m2).filter(|inertia_kg_m2| *inertia_kg_m2 > 0.0),
         }
     }
 
-    /// Guide of the first pass.
+    /// Guide of the first pass with tendons.
     pub fn first_pass(&self) -> Guide<'static> {
         self.guide(self.passes_nm_per_rad[0], &[], 1.0)
     }
@@ -103,23 +103,19 @@ impl Hold {
         self.guide(self.passes_nm_per_rad[1], ahead_nm, 1.0)
     }
 
-    /// Guide of the second pass without tendons; in the first, the torque of the motor was `motor_nm`, root mean square.
+    /// Guide of the only pass of `model` without tendons.
     ///
     /// Of all torques nothing is recorded but the duty: a motor half as strong, with half of all inertia and friction, moves alike and is guided
-    /// by half the torque. Guiding torques are therefore stated for a motor that follows its duty as the one does that the input was prepared
-    /// for, and act in proportion to the motor's own. Otherwise a fit would make the torque small by making the motor weak.
-    pub fn second_pass_beside(&self, motor_nm: f64) -> Guide<'static> {
-        let shown = self.driven_nm.filter(|_| motor_nm > 0.0).map_or(1.0, |driven_nm| driven_nm / motor_nm);
+    /// by half the torque, and so is one whose friction takes half of its torque. What is compared is therefore an acceleration, stated as
+    /// the torque that it takes with the inertia of the model that the input was prepared for. A torque would be made small by a light joint.
+    pub fn only_pass(&self, model: &JointModel) -> Guide<'static> {
+        let now_kg_m2 = model.direct_inertia_kg_m2();
+        let shown = self.direct_kg_m2.filter(|_| now_kg_m2 > 0.0).map_or(1.0, |kg_m2| kg_m2 / now_kg_m2);
         self.guide(self.passes_nm_per_rad[1], &[], shown)
     }
 
     fn guide<'a>(&self, stiffness_nm_per_rad: f64, ahead_nm: &'a [f64], shown: f64) -> Guide<'a> {
         Guide { stiffness_nm_per_rad, lead_s: self.lead_s, ahead_nm, shown }
-    }
-
-    /// Torque of the motor by its duty, root mean square, N·m; 0 with tendons.
-    pub fn driven_nm(&self) -> f64 {
-        self.driven_nm.unwrap_or(0.0)
     }
 
     /// Torque, N·m, with which the spring answers an angle of `rad`.
@@ -169,7 +165,7 @@ mod tests {
     /// Of a motor half as strong with half of all inertia, weight and drag the duty and the angle are the same, and so is what is shown of the
     /// guide.
     #[test]
-    fn without_tendons_the_guide_is_told_in_proportion_to_the_motor() {
+    fn without_tendons_the_guide_is_told_in_proportion_to_the_inertia() {
         let recording = test_bench::turned(4000, &[friction(0.1)]);
         let strong = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided();
         let mut weak = strong.clone();

@@ -27,6 +27,8 @@ pub struct ReplayInput {
     pub(super) start_rad_s: f64,
     clock_offset_s: f64,
     pub(super) hold: Hold,
+    /// Torque by the duty, root mean square, of a joint without tendons that its angle guides, N·m.
+    driven_nm: Option<f64>,
 }
 
 impl ReplayInput {
@@ -77,11 +79,10 @@ impl ReplayInput {
         let duty = take(Channel::Duty)?;
         let bus_v = take(Channel::BusVoltage)?;
         let theta_ref_rad = take(Channel::ThetaRef)?;
-        let driven_nm = model.parameters.motor.as_ref().map_or(0.0, |motor| {
+        let driven_nm = model.parameters.motor.as_ref().filter(|_| model.guided_by.is_some()).map(|motor| {
             let per_v = pulley_stall_torque_nm(motor) / motor.supply_v;
             per_v * bridge_rms_v(duty.as_deref(), bus_v.as_deref(), motor.supply_v)
         });
-        let hold = Hold::of(model, driven_nm);
         // A joint whose angle is no input is taken to stand where its reference begins, until it is told otherwise.
         let reference_rad = theta_ref_rad.as_ref().and_then(|reference| reference.first().copied());
         let start_rad = motion.as_ref().map(|m| m.theta_rad[0]).or(reference_rad);
@@ -95,7 +96,8 @@ impl ReplayInput {
             start_rad,
             start_rad_s,
             clock_offset_s: 0.0,
-            hold,
+            hold: Hold::of(model),
+            driven_nm,
             step_s,
             t_s,
         })
@@ -132,6 +134,7 @@ impl ReplayInput {
             start_rad_s: self.start_rad_s,
             clock_offset_s: self.clock_offset_s,
             hold: self.hold,
+            driven_nm: self.driven_nm,
         }
     }
 
@@ -164,10 +167,11 @@ impl ReplayInput {
         self.motion.as_ref().map_or(0.0, |motion| self.hold.answer_nm(rms(&motion.std_rad)))
     }
 
-    /// Torque of a motor without tendons by its duty, root mean square, N·m; 0 with tendons.
+    /// Torque by the duty, root mean square, N·m, of the model that the input was prepared for; `None` but for a joint without tendons that its
+    /// angle guides.
     #[must_use]
-    pub fn driven_nm(&self) -> f64 {
-        self.hold.driven_nm()
+    pub const fn driven_nm(&self) -> Option<f64> {
+        self.driven_nm
     }
 
     /// Reconstructed motion of the input pulley, if it is an input.

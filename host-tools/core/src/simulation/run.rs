@@ -25,8 +25,8 @@ pub(super) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// One pass; only `outputs` are sampled. Returns the root mean square of the motor's current, A, as far as the pass came.
-    pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) -> f64 {
+    /// One pass; only `outputs` are sampled.
+    pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) {
         let input = self.input;
         let n = input.t_s.len();
         let longest_s = self.model.step_s.min(self.config.stable_step_s());
@@ -50,10 +50,10 @@ impl Run<'_> {
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
         // Error of the angle as the lead of the guide has it.
-        let (mut late_rad, mut current_squares) = (0.0, 0.0);
+        let mut late_rad = 0.0;
         for k in 0..n {
             if sink.is_stopped() {
-                break;
+                return;
             }
             let mut torque_sum = 0.0;
             let span_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
@@ -113,11 +113,9 @@ impl Run<'_> {
                     plant.step(self.config, &step, dt_s);
                 }
             }
-            current_squares += plant.current_a() * plant.current_a();
             let outputs = sampler.sample(self.config, &plant, duty, (input.clock_at_s(k), span_s));
             sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
         }
-        (current_squares / n as f64).sqrt()
     }
 
     fn ratio(&self) -> f64 {

@@ -65,7 +65,7 @@ impl Dataset {
     /// Groups of blocks over which the flutter of a series is compared. Of what guides a joint without tendons it is the answer to single counts
     /// of the encoder, and says nothing of the joint.
     pub(super) fn flutter_of(&self, series: Series) -> &[Range<usize>] {
-        let says_nothing = series == Series::Guide && self.input.driven_nm() > 0.0;
+        let says_nothing = series == Series::Guide && self.input.driven_nm().is_some();
         if says_nothing { &[] } else { &self.flutter }
     }
 

@@ -70,7 +70,7 @@ pub(super) fn scale_of(model: &JointModel, series: Series, noise_variance: f64, 
             // A source of torque has no stall torque that means anything: of the torque that drove the joint, as of any other channel.
             let fitted = datasets.iter().filter(|dataset| dataset.is_fitted());
             let [driven_nm, noise_nm] = fitted
-                .map(|dataset| [dataset.input.driven_nm(), dataset.input.guide_noise_nm()])
+                .map(|dataset| [dataset.input.driven_nm().unwrap_or(0.0), dataset.input.guide_noise_nm()])
                 .fold([0.0_f64; 2], |most, one| [most[0].max(one[0]), most[1].max(one[1])]);
             f64::hypot(MODEL_FLOOR * driven_nm, noise_nm).max(f64::MIN_POSITIVE)
         }
