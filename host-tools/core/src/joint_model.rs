@@ -1,7 +1,7 @@
 //! What is simulated: parameters, effects, boundaries and the law that drives them.
 
 use bowden_model::channel::Channel;
-use bowden_model::drive::pulley_inertia_kg_m2;
+use bowden_model::drive::{pulley_inertia_kg_m2, pulley_stall_torque_nm};
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
 use bowden_model::load::inertia_kg_m2;
@@ -62,8 +62,18 @@ pub struct JointModel {
     pub smoothing_s: Vec<(Channel, f64)>,
     /// Parameters with a value of their own on single benches of a study; empty for one bench.
     pub own: OwnParameters,
-    /// Recorded angle to which a torque guides a joint without tendons whose motor drives it; `None` where it runs freely, as a rig file has it.
-    pub guided_by: Option<Channel>,
+    /// What guides a joint without tendons whose motor drives it; `None` where it runs freely, as a rig file has it.
+    pub guided_by: Option<GuidedBy>,
+}
+
+/// What guides a joint without tendons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidedBy {
+    /// Recorded angle to which a torque guides it.
+    pub angle: Channel,
+    /// Torque by the recorded duty, root mean square, N·m: the size of the torques at this joint. Of a source of torque the stall torque says
+    /// nothing.
+    pub driven_nm: f64,
 }
 
 /// How a replay drives the input side.
@@ -183,14 +193,37 @@ impl JointModel {
 
     /// The same joint as a comparison with recordings takes it. A motor without tendons, driven by its duty alone, integrates every torque that
     /// the model lacks twice, and after seconds the angle says little of where it was lacking; where the angle is recorded, a torque guides
-    /// the joint along it, and that torque is what is compared.
+    /// the joint along it, and that torque is what is compared. `recording` tells the size of the torques.
     #[must_use]
-    pub fn guided(mut self) -> Self {
+    pub fn guided(mut self, recording: &Recording) -> Self {
         let angles = [Channel::ThetaOut, Channel::ThetaIn];
         if self.parameters.tendon.is_none() && self.drive() == Ok(Drive::Duty) {
-            self.guided_by = angles.into_iter().find(|angle| self.outputs.contains(angle));
+            let angle = angles.into_iter().find(|angle| self.outputs.contains(angle));
+            self.guided_by = angle.map(|angle| GuidedBy { angle, driven_nm: self.driven_nm(recording) });
         }
         self
+    }
+
+    /// Torque at the input pulley by the recorded duty, root mean square, N·m; 0 without a motor or a duty.
+    #[must_use]
+    pub fn driven_nm(&self, recording: &Recording) -> f64 {
+        let (Some(motor), Some(duty)) = (&self.parameters.motor, recording.channel(Channel::Duty)) else {
+            return 0.0;
+        };
+        let bus_v = recording.channel(Channel::BusVoltage);
+        let volts = duty.iter().enumerate().map(|(k, duty)| duty * bus_v.map_or(motor.supply_v, |bus_v| bus_v[k]));
+        let mean_square = volts.map(|volt| volt * volt).sum::<f64>() / duty.len().max(1) as f64;
+        pulley_stall_torque_nm(motor) / motor.supply_v * mean_square.sqrt()
+    }
+
+    /// What the drive can do at the input pulley, N·m: its stall torque, and of a guided joint without tendons ten times what its recording asks
+    /// for, as much as a joint of the paper's size has. `None` without a motor.
+    #[must_use]
+    pub fn strength_nm(&self) -> Option<f64> {
+        /// Stall torque over the torque that a motion asks for.
+        const ASKED_FOR: f64 = 10.0;
+        let asked_for = self.guided_by.map(|guided| ASKED_FOR * guided.driven_nm).filter(|nm| *nm > 0.0);
+        asked_for.or_else(|| self.parameters.motor.as_ref().map(pulley_stall_torque_nm))
     }
 
     /// Inertia of rotor and load about the spindle of a joint without tendons, kg·m².
@@ -203,7 +236,7 @@ impl JointModel {
     /// Channel of the angle that guides the motor or is prescribed.
     #[must_use]
     pub fn guiding_channel(&self) -> Channel {
-        self.guided_by.unwrap_or(Channel::ThetaIn)
+        self.guided_by.map_or(Channel::ThetaIn, |guided| guided.angle)
     }
 }
 
@@ -229,14 +262,20 @@ mod tests {
         let turned = test_bench::turned(100, &[]);
         let direct = JointModel::from_rig(&test_bench::direct_rig(), &turned).unwrap();
         assert_eq!(direct.drive().unwrap(), Drive::Duty);
-        let guided = direct.clone().guided();
-        assert_eq!((guided.guided_by, guided.drive().unwrap()), (Some(Channel::ThetaOut), Drive::GuidedMotor));
+        assert_eq!(direct.strength_nm(), Some(20.0));
+        let guided = direct.clone().guided(&turned);
+        assert_eq!(guided.drive().unwrap(), Drive::GuidedMotor);
+        assert_eq!(guided.guided_by.map(|guided| guided.angle), Some(Channel::ThetaOut));
+        // The test bench drives with two waves; over a tenth of a second the first of them grows to 0.03 sin 0.8.
+        let long = direct.clone().guided(&test_bench::turned(8000, &[]));
+        // 20 N·m sqrt(0.03² + 0.015²) / sqrt 2, times ten.
+        assert!((long.strength_nm().unwrap() / 4.743 - 1.0).abs() < 0.02);
         let blind = JointModel { outputs: vec![Channel::MotorCurrent], ..direct.clone() };
-        assert_eq!(blind.clone().guided(), blind);
+        assert_eq!(blind.clone().guided(&turned), blind);
         let mut recording = test_bench::swung(100);
         recording.set(Channel::Duty, vec![0.0; 100]);
         let with_tendons = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        assert_eq!(with_tendons.clone().guided(), with_tendons);
+        assert_eq!(with_tendons.clone().guided(&recording), with_tendons);
     }
 
     #[test]

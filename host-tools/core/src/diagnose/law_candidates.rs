@@ -1,10 +1,8 @@
 //! Laws that the parts of a joint can have, and where to start: places and periods are read off what is left.
 
 use bowden_model::channel::Channel;
-use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::{ActiveEffect, Effect, Target};
 use bowden_model::law::{self, Form, LAWS, Law, Port, Variable};
-use bowden_model::parameters::MotorParameters;
 
 use super::candidates::{Candidate, fits, targets};
 use super::unexplained::samples::{Samples, Variable as Seen};
@@ -45,7 +43,8 @@ const PHASES_RAD: [f64; 2] = [0.0, std::f64::consts::FRAC_PI_2];
 /// What is known of the motion and of what is left, for all laws.
 struct Ground<'a> {
     objective: &'a Objective,
-    motor: Option<MotorParameters>,
+    /// What the drive can do, N·m.
+    strength_nm: Option<f64>,
     samples: Samples,
     input_rates: Vec<f64>,
     joint_rates: Vec<f64>,
@@ -63,7 +62,7 @@ pub(super) fn law_candidates(
     let samples = Samples::new(objective, predictions);
     let ground = Ground {
         objective,
-        motor: model.parameters.motor,
+        strength_nm: model.strength_nm(),
         input_rates: rates_along(&samples, Seen::ThetaIn),
         joint_rates: rates_along(&samples, Seen::ThetaOut),
         frequencies_hz: frequencies_hz(&samples, None),
@@ -113,11 +112,8 @@ impl Ground<'_> {
         match law.form() {
             Form::Ramp | Form::Square => vec![base],
             Form::SignedSquare => {
-                let stall_nm = self.motor.as_ref().map(pulley_stall_torque_nm);
-                stall_nm
-                    .map(|stall_nm| base.with("amplitude", -MISSING_AT_STALL / stall_nm))
-                    .into_iter()
-                    .collect()
+                let start = |strength_nm| base.with("amplitude", -MISSING_AT_STALL / strength_nm);
+                self.strength_nm.map(start).into_iter().collect()
             }
             Form::Hysteresis => self.loops(law, base),
             Form::PowerFromOne => EXPONENTS_FROM_ONE.map(|exponent| base.with("exponent", exponent)).to_vec(),

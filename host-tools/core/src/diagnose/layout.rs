@@ -9,7 +9,6 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::{ActiveEffect, Effect};
 use bowden_model::effects::CATALOGUE;
 use bowden_model::search::{Ordinary, OrdinaryUnit};
@@ -33,7 +32,7 @@ fn ordinary_in(model: &JointModel, effect: &dyn Effect) -> Option<[f64; 2]> {
     let Ordinary { unit, usual, largest } = effect.ordinary()?;
     let one = match unit {
         OrdinaryUnit::OfSheath => model.parameters.tendon.and(model.parameters.sheath).map(|_| 1.0),
-        OrdinaryUnit::StallTorque => model.parameters.motor.as_ref().map(pulley_stall_torque_nm),
+        OrdinaryUnit::StallTorque => model.strength_nm(),
     }?;
     Some([usual * one, largest * one])
 }

@@ -3,7 +3,6 @@
 //! The catalogue states sizes for a joint of the paper's size. In a finger that is a twentieth as strong the same fault is a
 //! twentieth of the torque: starting points, steps of an optimiser and what is too weak for a name follow the joint.
 
-use bowden_model::drive::pulley_stall_torque_nm;
 use bowden_model::effect::{ActiveEffect, Component, Effect, ParameterSpec};
 use bowden_model::load::GRAVITY_M_S2;
 
@@ -49,7 +48,7 @@ pub fn typical(model: &JointModel, component: Component, spec: &ParameterSpec) -
 /// Torques over those of the paper's joint: of a drive by what it can do, behind it by what cables and load bring.
 fn torque(model: &JointModel, component: Component) -> f64 {
     let parameters = &model.parameters;
-    let stall = parameters.motor.map(|motor| pulley_stall_torque_nm(&motor) / STALL_NM);
+    let stall = model.strength_nm().map(|strength_nm| strength_nm / STALL_NM);
     if let (Component::Motor, Some(stall)) = (component, stall) {
         return stall;
     }

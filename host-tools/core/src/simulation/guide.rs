@@ -148,7 +148,7 @@ mod tests {
     fn a_joint_without_tendons_is_guided_by_what_its_model_lacks() {
         let guided = |effects: &[ActiveEffect]| {
             let recording = test_bench::turned(6000, effects);
-            let model = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided();
+            let model = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided(&recording);
             assert_eq!(model.drive().unwrap(), Drive::GuidedMotor);
             let input = ReplayInput::new(&model, &recording).unwrap();
             (replay(&model, &input).unwrap(), input.motion().unwrap().clone())
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn without_tendons_the_guide_is_told_in_proportion_to_the_inertia() {
         let recording = test_bench::turned(4000, &[friction(0.1)]);
-        let strong = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided();
+        let strong = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided(&recording);
         let mut weak = strong.clone();
         for name in [
             "motor.torque_constant_nm_per_a",

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
-use bowden_model::drive::pulley_stall_torque_nm;
 
 use super::guide::Hold;
-use crate::joint_model::JointModel;
+use crate::joint_model::{GuidedBy, JointModel};
 use crate::outcome::Failure;
 use crate::reconstruct::{Motion, moving_average};
 use crate::recording::Recording;
@@ -66,7 +65,7 @@ impl ReplayInput {
             }))
         };
         let guiding = match model.guided_by {
-            Some(angle) => Some(recording.shared(angle).ok_or_else(|| {
+            Some(GuidedBy { angle, .. }) => Some(recording.shared(angle).ok_or_else(|| {
                 let (source, role) = (recording.source(), angle.role());
                 Failure::bad_input(format!(
                     "{source}: no column for {role}, which other recordings have; map one in [recording.columns]"
@@ -79,10 +78,6 @@ impl ReplayInput {
         let duty = take(Channel::Duty)?;
         let bus_v = take(Channel::BusVoltage)?;
         let theta_ref_rad = take(Channel::ThetaRef)?;
-        let driven_nm = model.parameters.motor.as_ref().filter(|_| model.guided_by.is_some()).map(|motor| {
-            let per_v = pulley_stall_torque_nm(motor) / motor.supply_v;
-            per_v * bridge_rms_v(duty.as_deref(), bus_v.as_deref(), motor.supply_v)
-        });
         // A joint whose angle is no input is taken to stand where its reference begins, until it is told otherwise.
         let reference_rad = theta_ref_rad.as_ref().and_then(|reference| reference.first().copied());
         let start_rad = motion.as_ref().map(|m| m.theta_rad[0]).or(reference_rad);
@@ -97,7 +92,7 @@ impl ReplayInput {
             start_rad_s,
             clock_offset_s: 0.0,
             hold: Hold::of(model),
-            driven_nm,
+            driven_nm: model.guided_by.map(|_| model.driven_nm(recording)),
             step_s,
             t_s,
         })
@@ -183,13 +178,6 @@ impl ReplayInput {
 
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
-/// Voltage of the bridge, root mean square, V.
-fn bridge_rms_v(duty: Option<&Vec<f64>>, bus_v: Option<&Vec<f64>>, supply_v: f64) -> f64 {
-    let Some(duty) = duty else { return 0.0 };
-    let volts = duty.iter().enumerate().map(|(k, duty)| duty * bus_v.map_or(supply_v, |bus_v| bus_v[k]));
-    rms(&volts.collect::<Vec<f64>>())
 }
 
 fn median_step_s(t_s: &[f64]) -> f64 {

@@ -6,7 +6,7 @@
 use bowden_model::channel::Channel;
 use bowden_model::drive::pulley_torque_constant_nm_per_a;
 
-use crate::joint_model::JointModel;
+use crate::joint_model::{GuidedBy, JointModel};
 use crate::recording::Recording;
 use crate::rig::RigParameter;
 
@@ -26,7 +26,7 @@ pub(super) fn untold(
     joint: &JointModel,
     fitted: &[&Recording],
 ) -> Vec<RigParameter> {
-    let Some(angle) = joint.guided_by else { return Vec::new() };
+    let Some(GuidedBy { angle, .. }) = joint.guided_by else { return Vec::new() };
     let (Some(motor), load) = (joint.parameters.motor, joint.parameters.load) else { return Vec::new() };
     let mut untold: Vec<RigParameter> = [
         "load.mass_kg",

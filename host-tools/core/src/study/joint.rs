@@ -107,7 +107,7 @@ impl Study {
         for assignment in &listed.set {
             assignment.apply(&mut rig)?;
         }
-        let base = JointModel::from_rig(&rig, &listed.recording)?.guided();
+        let base = JointModel::from_rig(&rig, &listed.recording)?.guided(&listed.recording);
         let set = listed.set.iter().map(|assignment| assignment.parameter).collect();
         Ok(Variation::new(base, listed.bench, joint, self.kept_by(bench), set))
     }
@@ -117,7 +117,7 @@ impl Study {
         let listed = self.recordings.iter().find(|listed| listed.bench == bench).ok_or_else(|| {
             Failure::bad_input(format!("bench `{}` has no recording; add one", self.benches[bench].name))
         })?;
-        Ok(JointModel::from_rig(&self.benches[bench].rig, &listed.recording)?.guided())
+        Ok(JointModel::from_rig(&self.benches[bench].rig, &listed.recording)?.guided(&listed.recording))
     }
 
     /// Parameters that a fit moves on this bench by itself.

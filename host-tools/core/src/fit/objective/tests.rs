@@ -34,7 +34,7 @@ fn of_a_joint_that_is_held_a_free_run_is_shown() {
     let friction = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap()).with("torque_nm", 0.1);
     let recording = test_bench::turned(3000, &[friction]);
     let free = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap();
-    let held = free.clone().guided();
+    let held = free.clone().guided(&recording);
     let objective = Objective::new(&held, std::slice::from_ref(&recording), &[], true).unwrap();
     let rmse = |shown: &[Prediction]| {
         objective.rmse(shown, Series::Channel(Channel::ThetaOut), Part::Training)
