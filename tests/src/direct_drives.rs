@@ -174,7 +174,7 @@ fn is_of(kind: DirectKind, id: &str) -> bool {
     ids.contains(&id)
 }
 
-/// Table of a run, and how many are right.
+/// Table of a run, how many are right, and how far a free run goes astray.
 #[must_use]
 pub fn table(examined: &[(u64, Examined)]) -> String {
     let mut text = format!(
@@ -193,7 +193,28 @@ pub fn table(examined: &[(u64, Examined)]) -> String {
             one.said()
         );
     }
-    let right = examined.iter().filter(|(_, one)| one.is_right()).count();
-    let _ = writeln!(text, "right: {right} of {}", examined.len());
+    let right = |of: &dyn Fn(&Examined) -> bool| {
+        let of: Vec<&Examined> = examined.iter().map(|(_, one)| one).filter(|one| of(one)).collect();
+        format!("{} of {}", of.iter().filter(|one| one.is_right()).count(), of.len())
+    };
+    let listed = |one: &Examined| !one.hidden.is_empty() && one.hidden.iter().all(|kind| is_listed(*kind));
+    let nothing = |one: &Examined| one.hidden.is_empty();
+    let _ = writeln!(
+        text,
+        "right: {}; effects of the catalogue {}, laws {}, nothing hidden {}",
+        right(&|_| true),
+        right(&listed),
+        right(&|one| !listed(one) && !nothing(one)),
+        right(&nothing)
+    );
+    let [given, recalibrated, diagnosed] = [0, 1, 2].map(|stage| {
+        let mut errors: Vec<f64> = examined.iter().map(|(_, one)| one.free_run_rad()[stage]).collect();
+        errors.sort_by(f64::total_cmp);
+        errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN)
+    });
+    let _ = writeln!(
+        text,
+        "angle in a free run, median: {given:.4} rad as given, {recalibrated:.4} recalibrated, {diagnosed:.4} diagnosed"
+    );
     text
 }
