@@ -38,7 +38,8 @@ pub struct Examined {
 #[must_use]
 pub fn cases() -> Vec<Vec<DirectKind>> {
     let singles = DirectKind::ALL.into_iter().map(|kind| vec![kind]);
-    let pairs = [[DirectKind::DryFriction, DirectKind::Cogging], [DirectKind::DryFriction, DirectKind::Spring]];
+    let pairs =
+        [[DirectKind::DryFriction, DirectKind::Cogging], [DirectKind::DryFriction, DirectKind::Spring]];
     let nothing = std::iter::repeat_n(Vec::new(), 3);
     singles.chain(pairs.into_iter().map(Vec::from)).chain(nothing).collect()
 }
@@ -97,7 +98,8 @@ impl Examined {
         let listed: Vec<DirectKind> = self.hidden.iter().copied().filter(|kind| is_listed(*kind)).collect();
         let all_named = listed.iter().all(|kind| named.iter().any(|id| is_of(*kind, id)));
         let none_false = named.iter().all(|id| listed.iter().any(|kind| is_of(*kind, id)));
-        let unlisted: Vec<DirectKind> = self.hidden.iter().copied().filter(|kind| !is_listed(*kind)).collect();
+        let unlisted: Vec<DirectKind> =
+            self.hidden.iter().copied().filter(|kind| !is_listed(*kind)).collect();
         let rest_is_right = match unlisted[..] {
             [] => self.diagnosis.laws.is_empty() && self.diagnosis.verdict != Verdict::Unexplained,
             _ => unlisted.iter().all(|kind| self.says_of_unlisted(*kind)),
@@ -107,7 +109,8 @@ impl Examined {
 
     fn says_of_unlisted(&self, kind: DirectKind) -> bool {
         let laws = &self.diagnosis.laws;
-        let is_over = |law: &FoundLaw, variable: &str| law.variables.iter().any(|name| name.starts_with(variable));
+        let is_over =
+            |law: &FoundLaw, variable: &str| law.variables.iter().any(|name| name.starts_with(variable));
         match kind {
             DirectKind::Drag => laws.iter().any(|law| {
                 let exponent = law.coefficients.get("exponent").map(|estimate| estimate.value);
@@ -135,7 +138,9 @@ impl Examined {
             DirectEffect::LowSpeedFriction { excess_nm, .. } => ("excess_nm", excess_nm),
             DirectEffect::GearFriction { share } => ("coefficient", share),
             DirectEffect::Cogging { amplitude_nm, .. } => ("amplitude_nm", amplitude_nm),
-            DirectEffect::Spring { stiffness_nm_per_rad, .. } => ("stiffness_nm_per_rad", stiffness_nm_per_rad),
+            DirectEffect::Spring { stiffness_nm_per_rad, .. } => {
+                ("stiffness_nm_per_rad", stiffness_nm_per_rad)
+            }
             DirectEffect::Drag { .. } | DirectEffect::Patch { .. } => return None,
         };
         let kind = *self.hidden.first()?;

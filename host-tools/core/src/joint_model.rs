@@ -211,7 +211,8 @@ impl JointModel {
             return 0.0;
         };
         let bus_v = recording.channel(Channel::BusVoltage);
-        let volts = duty.iter().enumerate().map(|(k, duty)| duty * bus_v.map_or(motor.supply_v, |bus_v| bus_v[k]));
+        let volts =
+            duty.iter().enumerate().map(|(k, duty)| duty * bus_v.map_or(motor.supply_v, |bus_v| bus_v[k]));
         let mean_square = volts.map(|volt| volt * volt).sum::<f64>() / duty.len().max(1) as f64;
         pulley_stall_torque_nm(motor) / motor.supply_v * mean_square.sqrt()
     }

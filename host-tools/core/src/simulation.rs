@@ -26,10 +26,10 @@ use crate::progress::Progress;
 use crate::reconstruct::moving_average;
 
 pub(crate) use delay_line::DelayLine;
+use guide::{FILTER_S, Guide};
 pub use input::ReplayInput;
 pub use prediction::{Prediction, Sink};
 use prediction::{StoppedBy, Watched};
-use guide::{FILTER_S, Guide};
 use run::Run;
 pub use sensors::through;
 

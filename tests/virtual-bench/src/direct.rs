@@ -230,10 +230,9 @@ impl DirectKind {
                 let cycles = draw.one_of(&[5.0, 7.0, 11.0, 14.0]);
                 DirectEffect::Cogging { amplitude_nm, cycles, phase_rad: draw.uniform(0.0, TAU) }
             }
-            Self::Spring => DirectEffect::Spring {
-                stiffness_nm_per_rad: of(0.3, 0.8),
-                rest_rad: draw.uniform(-0.3, 0.3),
-            },
+            Self::Spring => {
+                DirectEffect::Spring { stiffness_nm_per_rad: of(0.3, 0.8), rest_rad: draw.uniform(-0.3, 0.3) }
+            }
             Self::Drag => DirectEffect::Drag { nm_s2_per_rad2: of(0.06, 0.15) },
             Self::Patch => DirectEffect::Patch {
                 torque_nm: of(0.4, 0.8),
@@ -290,7 +289,8 @@ mod tests {
         let bench = DirectBench::drawn(3, &[DirectKind::Cogging]);
         assert_eq!(bench.record(2.0, 5), bench.record(2.0, 5));
         assert_ne!(bench.record(2.0, 5).theta_rad, bench.record(2.0, 6).theta_rad);
-        let largest = bench.record(8.0, 5).theta_rad.iter().fold(0.0_f64, |most, theta| most.max(theta.abs()));
+        let largest =
+            bench.record(8.0, 5).theta_rad.iter().fold(0.0_f64, |most, theta| most.max(theta.abs()));
         assert!((0.3..3.0).contains(&largest), "{largest} rad");
     }
 }

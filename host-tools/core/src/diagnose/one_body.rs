@@ -6,7 +6,8 @@ use bowden_model::effects::find;
 use crate::joint_model::JointModel;
 
 /// What a report says where it would name the motion that separates two effects.
-pub(super) const INSEPARABLE: &str = "no motion does, rotor and joint turn as one body; say which one it is by construction";
+pub(super) const INSEPARABLE: &str =
+    "no motion does, rotor and joint turn as one body; say which one it is by construction";
 
 /// End of the joint on which an effect acts, and what it is there.
 fn at_end(descriptor: &Descriptor) -> Option<(Component, &'static str)> {

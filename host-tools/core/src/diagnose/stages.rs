@@ -33,10 +33,7 @@ impl Stage {
         let residuals = objective.compare(&predictions);
         objective.run_freely(model, &mut predictions)?;
         let rmse = |(series, _): &(Series, f64)| objective.rmse(&predictions, *series, Part::HeldOut);
-        Ok(Self {
-            residuals,
-            heldout_rmse: objective.scales().iter().map(rmse).collect(),
-        })
+        Ok(Self { residuals, heldout_rmse: objective.scales().iter().map(rmse).collect() })
     }
 
     /// Mean loss over a part of the data.

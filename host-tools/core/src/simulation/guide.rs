@@ -46,7 +46,7 @@ pub(super) struct Guide<'a> {
     pub lead_s: Option<f64>,
     /// Torque at each sample that needs no angle to be left for it; none where it is empty.
     pub ahead_nm: &'a [f64],
-    /// What these torques are divided by where they act.
+    /// What these torques are divided by where they act, see [`Hold::only_pass`].
     pub shown: f64,
 }
 
@@ -148,7 +148,8 @@ mod tests {
     fn a_joint_without_tendons_is_guided_by_what_its_model_lacks() {
         let guided = |effects: &[ActiveEffect]| {
             let recording = test_bench::turned(6000, effects);
-            let model = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided(&recording);
+            let model =
+                JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided(&recording);
             assert_eq!(model.drive().unwrap(), Drive::GuidedMotor);
             let input = ReplayInput::new(&model, &recording).unwrap();
             (replay(&model, &input).unwrap(), input.motion().unwrap().clone())

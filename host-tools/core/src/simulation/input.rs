@@ -74,7 +74,8 @@ impl ReplayInput {
             None => take(Channel::ThetaIn)?,
         };
         let motion = guiding.map(|theta| Motion::from_encoder(&t_s, &theta));
-        let start_rad_s = motion.as_ref().filter(|_| model.guided_by.is_some()).map_or(0.0, |m| m.omega_rad_s[0]);
+        let start_rad_s =
+            motion.as_ref().filter(|_| model.guided_by.is_some()).map_or(0.0, |m| m.omega_rad_s[0]);
         let duty = take(Channel::Duty)?;
         let bus_v = take(Channel::BusVoltage)?;
         let theta_ref_rad = take(Channel::ThetaRef)?;

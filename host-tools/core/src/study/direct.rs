@@ -22,26 +22,21 @@ const SPEED_OVER_S: f64 = 0.1;
 /// - The arm where an inertia is stated beside the weight, or no weight: two numbers decide what a motion takes.
 /// - The resistance where no current is recorded: it is the torque of the duty.
 /// - The torque constant where another drag takes up its back-EMF, or nothing turns fast enough to show it.
-pub(super) fn untold(
-    joint: &JointModel,
-    fitted: &[&Recording],
-) -> Vec<RigParameter> {
+pub(super) fn untold(joint: &JointModel, fitted: &[&Recording]) -> Vec<RigParameter> {
     let Some(GuidedBy { angle, .. }) = joint.guided_by else { return Vec::new() };
     let (Some(motor), load) = (joint.parameters.motor, joint.parameters.load) else { return Vec::new() };
-    let mut untold: Vec<RigParameter> = [
-        "load.mass_kg",
-        "load.inertia_kg_m2",
-        "load.viscous_nm_s_per_rad",
-        "motor.viscous_nm_s_per_rad",
-    ]
-    .into_iter()
-    .filter_map(|name| RigParameter::parse(name).ok())
-    .filter(|parameter| joint.value(parameter) == Some(0.0))
-    .collect();
-    let has_drag = motor.viscous_nm_s_per_rad > 0.0 || load.is_some_and(|load| load.viscous_nm_s_per_rad > 0.0);
+    let mut untold: Vec<RigParameter> =
+        ["load.mass_kg", "load.inertia_kg_m2", "load.viscous_nm_s_per_rad", "motor.viscous_nm_s_per_rad"]
+            .into_iter()
+            .filter_map(|name| RigParameter::parse(name).ok())
+            .filter(|parameter| joint.value(parameter) == Some(0.0))
+            .collect();
+    let has_drag =
+        motor.viscous_nm_s_per_rad > 0.0 || load.is_some_and(|load| load.viscous_nm_s_per_rad > 0.0);
     let fastest_rad_s = fitted.iter().map(|recording| fastest_rad_s(recording, angle)).fold(0.0, f64::max);
     let back_emf_v = pulley_torque_constant_nm_per_a(&motor) * fastest_rad_s;
-    let current_is_recorded = fitted.iter().any(|recording| recording.channel(Channel::MotorCurrent).is_some());
+    let current_is_recorded =
+        fitted.iter().any(|recording| recording.channel(Channel::MotorCurrent).is_some());
     let further = [
         ("load.arm_m", load.is_some_and(|load| load.inertia_kg_m2 > 0.0 || load.mass_kg == 0.0)),
         ("motor.resistance_ohm", !current_is_recorded),
@@ -62,7 +57,8 @@ fn fastest_rad_s(recording: &Recording, angle: Channel) -> f64 {
             from += 1;
         }
         if t_s[to] - t_s[from] > 0.5 * SPEED_OVER_S {
-            fastest_rad_s = fastest_rad_s.max((theta_rad[to] - theta_rad[from]).abs() / (t_s[to] - t_s[from]));
+            fastest_rad_s =
+                fastest_rad_s.max((theta_rad[to] - theta_rad[from]).abs() / (t_s[to] - t_s[from]));
         }
     }
     fastest_rad_s
@@ -89,7 +85,8 @@ mod tests {
     #[test]
     fn of_a_source_of_torque_inertia_weight_and_drag_are_told() {
         let swung = || test_bench::turned(2000, &[]);
-        let expected = ["motor.rotor_inertia_kg_m2", "load.mass_kg", "load.inertia_kg_m2", "load.viscous_nm_s_per_rad"];
+        let expected =
+            ["motor.rotor_inertia_kg_m2", "load.mass_kg", "load.inertia_kg_m2", "load.viscous_nm_s_per_rad"];
         assert_eq!(moved(&joint(|_| (), swung())), expected);
         let without_weight = joint(|rig| rig.joint.load.as_mut().unwrap().mass_kg = 0.0, swung());
         assert_eq!(moved(&without_weight), [expected[0], expected[2], expected[3]]);

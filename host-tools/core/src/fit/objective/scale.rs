@@ -72,7 +72,9 @@ pub(super) fn scale_of(model: &JointModel, series: Series, noise_variance: f64, 
             let [driven_nm, noise_nm] = fitted
                 .map(|dataset| [dataset.input.driven_nm().unwrap_or(0.0), dataset.input.guide_noise_nm()])
                 .fold([0.0_f64; 2], |most, one| [most[0].max(one[0]), most[1].max(one[1])]);
-            f64::hypot(MODEL_FLOOR * driven_nm, noise_nm).max(f64::MIN_POSITIVE)
+            // A pendulum that swings by itself is driven by none.
+            let floor_nm = if driven_nm > 0.0 { MODEL_FLOOR * driven_nm } else { SHARE * stall_nm };
+            f64::hypot(floor_nm, noise_nm).max(f64::MIN_POSITIVE)
         }
         Series::Channel(channel) => {
             let floor = match channel {

@@ -31,14 +31,14 @@ fn a_replay_compared_as_it_runs_is_compared_as_a_whole() {
 /// where the recording does.
 #[test]
 fn of_a_joint_that_is_held_a_free_run_is_shown() {
-    let friction = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap()).with("torque_nm", 0.1);
+    let friction =
+        ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap()).with("torque_nm", 0.1);
     let recording = test_bench::turned(3000, &[friction]);
     let free = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap();
     let held = free.clone().guided(&recording);
     let objective = Objective::new(&held, std::slice::from_ref(&recording), &[], true).unwrap();
-    let rmse = |shown: &[Prediction]| {
-        objective.rmse(shown, Series::Channel(Channel::ThetaOut), Part::Training)
-    };
+    let rmse =
+        |shown: &[Prediction]| objective.rmse(shown, Series::Channel(Channel::ThetaOut), Part::Training);
     let mut predictions = objective.predict(&held).unwrap();
     let when_held = rmse(&predictions);
     let guide_nm = predictions[0].guide_nm.clone();
@@ -58,6 +58,19 @@ fn of_a_joint_that_is_held_a_free_run_is_shown() {
     let before = predictions.clone();
     objective.run_freely(&tendons, &mut predictions).unwrap();
     assert_eq!(predictions, before);
+}
+
+/// A pendulum that swings by itself, of which the duty is zero: what guides it is compared in 0.15 % of 20 N·m.
+#[test]
+fn a_joint_that_nothing_drives_is_compared_in_a_share_of_the_stall_torque() {
+    let t_s: Vec<f64> = (0..2000).map(|k| f64::from(k) * 2e-3).collect();
+    let swing = t_s.iter().map(|t| 0.3 * (3.46 * t).cos()).collect();
+    let recording =
+        Recording::new("swing", t_s).with(Channel::ThetaOut, swing).with(Channel::Duty, vec![0.0; 2000]);
+    let model = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided(&recording);
+    let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+    assert!((objective.scale(Series::Guide) - 0.03).abs() < 1e-3);
+    assert!(objective.residuals(&model).unwrap().is_finite());
 }
 
 /// What was not measured is not compared, but a winding heats whether its current was recorded or not.
