@@ -158,24 +158,32 @@ fn a_quasi_direct_drive_swings_as_its_reported_torque_says() {
     assert!(shown[1].spike_share > 0.3 && shown[1].spikes < 0.1, "{shown:?}");
 }
 
-/// Two pendulums on one actuator, from a rig file without friction: dry friction, published as 0.1839 N m.
+/// A pendulum that an actuator swings up, from a rig file without friction: what holds it at rest, published as 0.1839 N m of dry friction. Its
+/// free run is then predicted on seconds that were held out. Of the recording under the position loop, whose torque is not what reached
+/// the pendulum, nothing is named, nor of both together.
 #[test]
-fn the_dry_friction_of_a_quasi_direct_drive_is_named() {
+fn the_friction_of_a_quasi_direct_drive_is_named() {
     let Some(data) = data(direct_drive::FOLDER) else { return };
-    let [.., both] = direct_drive::studies(&data).unwrap();
-    let answer = both.diagnose().unwrap();
+    let [swing_up, position_loop, both] = direct_drive::studies(&data).unwrap();
+    let answer = swing_up.diagnose().unwrap();
     println!("{}", answer.said());
-    let diagnosis = &answer.diagnosis;
-    let [friction] = &diagnosis.effects[..] else { panic!("{:?}", diagnosis.effects) };
-    // Motor and joint are one body.
-    assert!(
-        ["motor_coulomb_friction", "joint_coulomb_friction"].contains(&friction.id.as_str()),
-        "{friction:?}"
-    );
-    let dry_nm = friction.parameters["torque_nm"].value;
-    assert!((dry_nm - 0.1839).abs() < 0.05, "{friction:?}");
-    let fit = &diagnosis.fit.channels["theta_out_rad"];
-    assert!(fit.after_rmse < 0.5 * fit.recalibrated_rmse, "{fit:?}");
+    let named = |id: &str| answer.diagnosis.effects.iter().find(|effect| effect.id == id);
+    let at_rest = [
+        ("motor_coulomb_friction", "torque_nm"),
+        ("joint_coulomb_friction", "torque_nm"),
+        ("motor_stribeck_friction", "coulomb_nm"),
+        ("motor_stribeck_friction", "excess_nm"),
+    ];
+    let found = at_rest.iter().filter_map(|(id, parameter)| Some(named(id)?.parameters[*parameter].value));
+    let at_rest_nm: f64 = found.sum();
+    assert!((at_rest_nm - 0.1839).abs() < 0.05, "{at_rest_nm}");
+    let fit = &answer.diagnosis.fit.channels["theta_out_rad"];
+    assert!(fit.free_run && fit.after_rmse < 0.3 * fit.recalibrated_rmse, "{fit:?}");
+    for study in [position_loop, both] {
+        let answer = study.diagnose().unwrap();
+        assert!(answer.diagnosis.effects.is_empty(), "{}", answer.said());
+        assert!(answer.diagnosis.unexplained.is_some(), "{}", answer.said());
+    }
 }
 
 #[test]
