@@ -1,9 +1,10 @@
-//! Without tendons rotor and joint turn as one body: what acts on the one acts on the other.
+//! Without tendons rotor and joint turn as one body: what acts on the one acts on the other, unless the angle is prescribed, which no torque
+//! changes.
 
 use bowden_model::effect::{ActiveEffect, Component, Descriptor, Effect};
 use bowden_model::effects::find;
 
-use crate::joint_model::JointModel;
+use crate::joint_model::{Drive, JointModel};
 
 /// What a report says where it would name the motion that separates two effects.
 pub(super) const INSEPARABLE: &str =
@@ -22,25 +23,33 @@ fn is_of_the_other_end(one: &Descriptor, other: &Descriptor) -> bool {
         if at_one != at_other && of_one == of_other)
 }
 
-/// Whether, in `model`, the two effects are the same one.
-pub(super) fn are_one(model: &JointModel, one: &ActiveEffect, other: &ActiveEffect) -> bool {
-    model.parameters.tendon.is_none() && is_of_the_other_end(one.descriptor(), other.descriptor())
+/// Whether rotor and joint of `model` answer to the same torques.
+fn turns_as_one(model: &JointModel) -> bool {
+    model.parameters.tendon.is_none() && model.drive().is_ok_and(|drive| drive != Drive::Angle)
 }
 
-/// Whether `model` has `effect` already, at its other end or as a part of an effect that it has: dry friction that grows at low speed is dry
+/// Whether, in `model`, the two effects are the same one.
+pub(super) fn are_one(model: &JointModel, one: &ActiveEffect, other: &ActiveEffect) -> bool {
+    turns_as_one(model) && is_of_the_other_end(one.descriptor(), other.descriptor())
+}
+
+/// Whether `model` has `effect` already at its other end, or as a part of an effect that it has: dry friction that grows at low speed is dry
 /// friction at high speed.
 pub(super) fn has(model: &JointModel, effect: &dyn Effect) -> bool {
     let wanted = effect.descriptor();
-    let is_same = |had: &Descriptor| had.id == wanted.id || is_of_the_other_end(had, wanted);
-    model.parameters.tendon.is_none()
+    let is_part = |part: &Descriptor| part.id == wanted.id || is_of_the_other_end(part, wanted);
+    turns_as_one(model)
         && model.effects.iter().any(|active| {
             let part = active.effect.remainder(&active.parameters).and_then(|(id, _)| find(id));
-            is_same(active.descriptor()) || part.is_some_and(|part| is_same(part.descriptor()))
+            is_of_the_other_end(active.descriptor(), wanted)
+                || part.is_some_and(|part| is_part(part.descriptor()))
         })
 }
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
+
     use super::*;
     use crate::test_bench;
 
@@ -50,6 +59,7 @@ mod tests {
         let effect = |id: &str| ActiveEffect::with_defaults(find(id).unwrap());
         let direct = JointModel::from_rig(&test_bench::direct_rig(), &turned).unwrap();
         let tendons = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(2)).unwrap();
+        let prescribed = JointModel { inputs: vec![Channel::ThetaIn], ..direct.clone() };
         let has = |model: &JointModel, had: &str, wanted: &str| {
             let with = JointModel { effects: vec![effect(had)], ..model.clone() };
             super::has(&with, find(wanted).unwrap())
@@ -61,9 +71,12 @@ mod tests {
             ("motor_coulomb_friction", "motor_stribeck_friction", false),
             ("joint_viscous_friction", "joint_coulomb_friction", false),
             ("joint_spring", "motor_cogging", false),
+            // Another sensor may have the same error.
+            ("sensor_offset", "sensor_offset", false),
         ] {
             assert_eq!(has(&direct, had, wanted), is_there, "{had}, {wanted}");
             assert!(!has(&tendons, had, wanted), "{had}, {wanted} with tendons");
+            assert!(!has(&prescribed, had, wanted), "{had}, {wanted} under a prescribed angle");
         }
     }
 }
