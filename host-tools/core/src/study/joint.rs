@@ -26,7 +26,7 @@ impl Study {
         let mut joint = self.joint_of(0)?;
         let mut values = Vec::new();
         for (index, bench) in self.benches.iter().enumerate() {
-            for parameter in self.fitted_on(bench) {
+            for parameter in self.fitted_on(index) {
                 let value = parameter.get(&bench.rig);
                 values.push(OwnParameter { bench: index, parameter, value });
             }
@@ -98,7 +98,7 @@ impl Study {
 
     /// Whether the joint of a recording is the shared one.
     fn is_plain(&self, listed: &StudyRecording) -> bool {
-        listed.bench == 0 && listed.set.is_empty() && self.fitted_on(&self.benches[0]).is_empty()
+        listed.bench == 0 && listed.set.is_empty() && self.fitted_on(0).is_empty()
     }
 
     fn variation(&self, listed: &StudyRecording, joint: &JointModel) -> Result<Variation, Failure> {
@@ -121,9 +121,11 @@ impl Study {
     }
 
     /// Parameters that a fit moves on this bench by itself.
-    fn fitted_on(&self, bench: &Bench) -> Vec<RigParameter> {
+    fn fitted_on(&self, index: usize) -> Vec<RigParameter> {
+        let bench = &self.benches[index];
         let mut fitted = bench.own.clone();
-        let is_moved = |of: Of| of != Of::Direct || bench.rig.joint.tendon.is_none();
+        let is_guided = self.joint_of(index).is_ok_and(|joint| joint.guided_by.is_some());
+        let is_moved = |of: Of| of != Of::Direct || is_guided;
         for Calibrated { section, name, .. } in CALIBRATED.into_iter().filter(|listed| is_moved(listed.of)) {
             if let Ok(parameter) = RigParameter::parse(&format!("{section}.{name}"))
                 && self.is_stated_differently(&parameter)
@@ -212,6 +214,30 @@ mod tests {
         assert_eq!(gaps(&joint), [0.01, 0.01], "before a fit has moved it, the effect is as it was found");
         joint.own.values[0].value = Some(0.03);
         assert_eq!(gaps(&joint), [0.01, 0.03]);
+    }
+
+    /// Two joints without tendons whose rig files state other inertias: each has its own where its duty drives it, and stays as stated where
+    /// the angle is prescribed.
+    #[test]
+    fn inertias_that_rig_files_state_differently_are_moved_where_a_torque_drives_them() {
+        let moved = |inputs: &[Channel]| {
+            let mut recording = test_bench::turned(10, &[]);
+            let theta_rad = recording.channel(Channel::ThetaOut).unwrap().to_vec();
+            recording.set(Channel::ThetaIn, theta_rad);
+            let mut rig = test_bench::direct_rig();
+            rig.replay_inputs = Some(inputs.to_vec());
+            let mut study = Study::of_bench(rig.clone(), vec![recording], Vec::new());
+            rig.joint.load.as_mut().unwrap().inertia_kg_m2 = 0.05;
+            study.benches.push(Bench { name: "second".to_owned(), rig, own: Vec::new() });
+            let listed = StudyRecording { bench: 1, ..study.recordings[0].clone() };
+            study.recordings.push(listed);
+            let joint = study.joint().unwrap();
+            let all = recalibrated(&joint);
+            let inertias = all.iter().filter(|free| free.path(&joint) == "load.inertia_kg_m2");
+            inertias.map(|free| free.bench(&joint)).collect::<Vec<_>>()
+        };
+        assert_eq!(moved(&[Channel::Duty]), [Some(0), Some(1)]);
+        assert_eq!(moved(&[Channel::ThetaIn]), []);
     }
 
     #[test]
