@@ -100,7 +100,7 @@ pub fn solve_in_rounds(
 
 /// What a fit of the same model without its last parameters knows.
 pub struct Known<'a> {
-    /// Slopes over the first parameters; without them every slope is found anew.
+    /// Slopes over the first parameters; without them, or without a row, every slope is found anew.
     pub jacobian: Option<&'a DMatrix<f64>>,
     /// What a weighted residual was spread by.
     pub spread: f64,
@@ -150,7 +150,8 @@ fn solve_knowing(
     known: Option<&Known>,
     progress: &dyn Progress,
 ) -> Result<Solution, Failure> {
-    let slopes = known.and_then(|known| known.jacobian);
+    // There are none where a simulation beside the fitted model ran away.
+    let slopes = known.and_then(|known| known.jacobian).filter(|jacobian| jacobian.nrows() > 0);
     let [objective, judging] = objective.split();
     // Inside the optimiser an error could not be told.
     let mut start = objective.residuals(model)?;
@@ -319,10 +320,14 @@ fn standard_deviations(jacobian: &DMatrix<f64>, fixed: &[bool]) -> Vec<Option<f6
 #[cfg(test)]
 mod tests {
     use bowden_model::channel::Channel;
+    use nalgebra::DMatrix;
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;
 
-    use super::{COARSE_STEP, FINE_STEP, autocorrelation_time, solve_in_rounds, spread, training_rows};
+    use super::{
+        COARSE_STEP, FINE_STEP, Known, autocorrelation_time, solve_for_ranking, solve_in_rounds, spread,
+        training_rows,
+    };
     use crate::fit::free::Free;
     use crate::fit::objective::{Objective, Residuals};
     use crate::joint_model::JointModel;
@@ -375,6 +380,21 @@ mod tests {
         let (angle_alone, tensions) = (found(&[Channel::ThetaOut]), found(&Channel::TENSIONS));
         assert!((angle_alone - 1.0).abs() < 0.05, "{angle_alone}");
         assert!((tensions - 1.3).abs() < 0.02, "{tensions}");
+    }
+
+    /// Where a neighbour of the fitted model could not be simulated its slopes have no row.
+    #[test]
+    fn a_fit_beside_slopes_without_a_row_finds_its_own() {
+        let recording = test_bench::turned(2000, &[]);
+        let model = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap().guided(&recording);
+        let free = [Free::nominal(&model, "load", "inertia_kg_m2").unwrap()];
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let empty = DMatrix::zeros(0, 1);
+        let fitted = [None, Some(&empty)].map(|jacobian| {
+            let known = Known { jacobian, spread: 1.0 };
+            solve_for_ranking(&objective, &model, &free, 5, &known).unwrap().values
+        });
+        assert_eq!(fitted[0], fitted[1]);
     }
 
     /// A first-order process of pole `p` stays alike for `(1 + p)/(1 - p)` samples.

@@ -160,8 +160,6 @@ impl Search<'_> {
         let (layout, with) = present.layout.with(without, screened.start);
         let free = layout.free(self.believed, &with);
         let gone = present.layout.parameters_missing_in(&layout, self.believed);
-        // There are none where a simulation beside the fitted model ran away.
-        let known_slopes = known_slopes && slopes.jacobian.nrows() > 0;
         let jacobian = known_slopes.then(|| slopes.jacobian.clone().remove_columns_at(&gone));
         let known = Known { jacobian: jacobian.as_ref(), spread: slopes.spread };
         let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
