@@ -267,7 +267,6 @@ mod tests {
         let guided = direct.clone().guided(&turned);
         assert_eq!(guided.drive().unwrap(), Drive::GuidedMotor);
         assert_eq!(guided.guided_by.map(|guided| guided.angle), Some(Channel::ThetaOut));
-        // The test bench drives with two waves; over a tenth of a second the first of them grows to 0.03 sin 0.8.
         let long = direct.clone().guided(&test_bench::turned(8000, &[]));
         // 20 N·m sqrt(0.03² + 0.015²) / sqrt 2, times ten.
         assert!((long.strength_nm().unwrap() / 4.743 - 1.0).abs() < 0.02);

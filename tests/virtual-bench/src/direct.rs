@@ -18,7 +18,7 @@ const SAMPLE_S: f64 = 2e-3;
 /// Simulation steps of a sample.
 const STEPS: usize = 40;
 
-/// What is hidden in such a joint. Torques are multiples of what turns it in the mean.
+/// What is hidden in such a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "the names and the equations above say it")]
 pub enum DirectEffect {
@@ -188,13 +188,12 @@ impl DirectBench {
         let rest_kg_m2 = self.inertia_kg_m2 - mass_kg * arm_m * arm_m;
         format!(
             "schema = \"bowden-rig/1\"\nname = \"joint without tendons\"\n\n[motor]\nsupply_v = 1000.0\nresistance_ohm = 0.1\n\
-             inductance_h = 0.0\ntorque_constant_nm_per_a = 0.002\ngear_ratio = 1.0\nrotor_inertia_kg_m2 = {:.6e}\n\
+             inductance_h = 0.0\ntorque_constant_nm_per_a = 0.002\ngear_ratio = 1.0\nrotor_inertia_kg_m2 = 1e-6\n\
              viscous_nm_s_per_rad = 0.0\n\n[load]\nmass_kg = {:.6e}\narm_m = {arm_m}\ninertia_kg_m2 = {:.6e}\n\
              viscous_nm_s_per_rad = {:.6e}\n\n[sensors]\nencoder_bits = 16\ncurrent_noise_a = 0.0\n\n[simulation]\n\
              step_s = 1e-3\neffects = []\n\n[recording.columns]\nt_s = {{ column = \"t_s\" }}\n\
              theta_out_rad = {{ column = \"theta_rad\" }}\nduty = {{ column = \"torque_nm\", scale = 0.05 }}\n\n\
              [replay]\ninputs = [\"duty\"]\noutputs = [\"theta_out_rad\"]\n",
-            1e-6,
             about(mass_kg, 0.1),
             about(rest_kg_m2, 0.15),
             about(self.viscous_nm_s_per_rad, 0.4),

@@ -321,9 +321,9 @@ impl Objective {
     /// When the model cannot be driven.
     pub fn run_freely(&self, model: &JointModel, predictions: &mut [Prediction]) -> Result<(), Failure> {
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
-            if let Some(free) = dataset.replay_freely(model)? {
-                let guide_nm = std::mem::take(&mut prediction.guide_nm);
-                *prediction = Prediction { guide_nm, ..free };
+            if let Some(mut free) = dataset.replay_freely(model)? {
+                free.guide_nm = std::mem::take(&mut prediction.guide_nm);
+                *prediction = free;
             }
         }
         Ok(())

@@ -165,7 +165,35 @@ fn rounded(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
+
     use super::*;
+    use crate::progress::Quiet;
+    use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
+
+    /// The errors of a joint that a fit holds to its angle are those of a replay that begins where the recording does.
+    #[test]
+    fn errors_of_a_joint_that_is_held_are_of_a_free_run() {
+        let recording = test_bench::turned(3000, &[]);
+        let mut rig = test_bench::direct_rig();
+        rig.joint.load.as_mut().unwrap().inertia_kg_m2 *= 1.1;
+        let free = JointModel::from_rig(&rig, &recording).unwrap();
+        let study = Study::of_bench(rig, vec![recording.clone()], Vec::new());
+        let fitted = recalibrate(&study, &Quiet).unwrap();
+        let of_angle = |error: &&ChannelError| error.series == Series::Channel(Channel::ThetaOut);
+        let error = fitted.channels.iter().find(of_angle).unwrap();
+        let mut input = ReplayInput::new(&free, &recording).unwrap();
+        let theta_rad = recording.channel(Channel::ThetaOut).unwrap();
+        input.start_at(theta_rad[0], 0.0);
+        let replayed = replay(&free, &input).unwrap();
+        // What is before the first block is not compared.
+        let pairs = replayed.channel(Channel::ThetaOut).unwrap().iter().zip(theta_rad).skip(150);
+        let squares: Vec<f64> = pairs.map(|(a, b)| (a - b).powi(2)).collect();
+        let expected = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        assert!((error.before / expected - 1.0).abs() < 0.05, "{} for {expected} rad", error.before);
+        assert!(error.after < 0.1 * error.before, "{error:?}");
+    }
 
     #[test]
     fn values_keep_six_digits_whatever_their_size() {

@@ -224,6 +224,15 @@ fn reports_with_little_in_them_still_read() {
 }
 
 #[test]
+fn errors_of_a_free_run_are_said_to_be_of_one() {
+    let mut findings = example::findings(2000);
+    assert!(!render(&findings).contains("free run"));
+    findings.diagnosis.fit.channels.get_mut("theta_out_rad").unwrap().free_run = true;
+    let page = render(&findings);
+    assert!(page.contains(", free run") && page.contains("held to its recorded angle"));
+}
+
+#[test]
 fn values_that_are_not_finite_never_reach_the_page() {
     let mut findings = example::findings(2000);
     for trace in &mut findings.traces {

@@ -12,7 +12,7 @@ use crate::progress::Progress;
 /// Predicted channels, one value a sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prediction {
-    pub(crate) channels: Vec<(Channel, Vec<f64>)>,
+    pub(super) channels: Vec<(Channel, Vec<f64>)>,
     /// Torque that guided the motor, N·m at the input pulley; what its model does not explain. Empty where none was
     /// needed.
     pub guide_nm: Vec<f64>,
