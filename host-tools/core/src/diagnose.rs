@@ -5,7 +5,7 @@
 //! 3. Every effect of the catalogue is tried: simulated at several starting points, ranked, the best refitted together
 //!    with all nominal parameters.
 //! 4. An effect is named only if it takes more off the loss than what any two realities differ by.
-//! 5. The named physics is fitted once more at the rig's own resolution and written as a rig file.
+//! 5. The named physics is fitted once more at the rig's own resolution, a joint without tendons in a free run, and written as a rig file.
 //! 6. What is held out has taken no part so far, and judges the result.
 
 mod afterwards;
@@ -41,7 +41,7 @@ use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::law;
 
 use crate::fit::objective::{Objective, Part, Series};
-use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
+use crate::fit::solver::{FINE_STEP, FREE_RUN_STEPS, Solution, solve_in_rounds};
 use crate::fit::variation::Variation;
 use crate::hypothesis;
 use crate::joint_model::JointModel;
@@ -265,13 +265,29 @@ impl Case<'_> {
             // The search may have explained what the rig that is written does not.
             unexplained = unexplained::far_off(objective, judging, &last.model)?;
         }
+        let plain = last.model.clone();
         let hums = if selected.complete { self.add_hums(&mut last.model)? } else { Vec::new() };
-        let stages = Stages { before, recalibrated, after: Stage::of(judge, &last.model)? };
+        let mut stages = Stages { before, recalibrated, after: Stage::of(judge, &last.model)? };
         if selected.chosen.is_empty()
             && let Some(inconstant) =
                 constancy::inconstant(judge, &stages.before.residuals, &stages.after.residuals)
         {
             unexplained = Some(inconstant);
+        }
+        if selected.complete
+            && let Some(free_runs) = objective.freely(model)
+        {
+            // What will be simulated runs freely. Effects are not chosen anew: far from what is there, all free runs are equally wrong.
+            let freely = |found: &JointModel| refine(&free_runs, model, found, &FREE_RUN_STEPS);
+            last = freely(&plain)?;
+            last.model.effects.extend(hums.iter().map(|(hum, _)| hum.law));
+            stages.after = Stage::of(judge, &last.model)?;
+            stages.recalibrated = if selected.chosen.is_empty() {
+                Stage::of(judge, &last.model)?
+            } else {
+                let baseline = at_full_resolution(&selected.baseline.model, model);
+                Stage::of(judge, &freely(&baseline)?.model)?
+            };
         }
         let traces = stages::traces(judge, model, &last.model)?;
         let left = Left { hums, unexplained };

@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use bowden_core::diagnose::verdict::Diagnosis;
 use bowden_core::joint_model::JointModel;
 use bowden_core::outcome::Failure;
 use bowden_model::channel::Channel;
@@ -206,6 +207,51 @@ pub fn shown(data: &Path) -> Result<Vec<Shown>, Failure> {
     listed_recordings(&folder)?.into_iter().map(of).collect()
 }
 
+/// A friction torque, N·m, of a speed in rad/s and a reported torque in N·m, over the path that the pendulum of a recording travels: the work
+/// that it takes, over that path.
+///
+/// # Errors
+/// When the file is missing or unusable.
+pub fn friction_over_path_nm(
+    data: &Path,
+    recording: &str,
+    friction_nm: impl Fn(f64, f64) -> f64,
+) -> Result<f64, Failure> {
+    let path = data.join(FOLDER).join(format!("{recording}.csv"));
+    let [speed_rad_s, torque_nm] = columns(&path, ["velocity_rad_s", "motor_torque_nm"])?;
+    let pairs = || speed_rad_s.iter().map(|speed| speed.abs()).zip(&torque_nm);
+    let power: f64 = pairs().map(|(speed, torque)| speed * friction_nm(speed, *torque)).sum();
+    Ok(power / pairs().map(|(speed, _)| speed).sum::<f64>())
+}
+
+/// Dry and viscous friction that `model` has, N·m, at a speed in rad/s.
+#[must_use]
+pub fn fitted_friction_nm(model: &JointModel, speed_rad_s: f64) -> f64 {
+    let dry_nm = model.effects.first().map_or(0.0, |effect| effect.parameters[0]);
+    let viscous = model.parameters.load.map_or(0.0, |load| load.viscous_nm_s_per_rad);
+    dry_nm + viscous * speed_rad_s.abs()
+}
+
+/// Friction that a diagnosis names, N·m, at a speed in rad/s under a torque in N·m: dry, falling with speed, and in proportion to the load of a
+/// gear.
+#[must_use]
+pub fn named_friction_nm(diagnosis: &Diagnosis, speed_rad_s: f64, torque_nm: f64) -> f64 {
+    let value = |id: &str, parameter: &str| {
+        let named = diagnosis.effects.iter().find(|effect| effect.id == id);
+        named.and_then(|effect| effect.parameters.get(parameter)).map(|estimate| estimate.value)
+    };
+    let dry = [
+        value("motor_coulomb_friction", "torque_nm"),
+        value("joint_coulomb_friction", "torque_nm"),
+        value("motor_stribeck_friction", "coulomb_nm"),
+    ];
+    let falling = value("motor_stribeck_friction", "excess_nm")
+        .zip(value("motor_stribeck_friction", "speed_rad_s"))
+        .map(|(excess_nm, slow_rad_s)| excess_nm * (-(speed_rad_s / slow_rad_s).powi(2)).exp());
+    let of_load = value("gear_load_friction", "coefficient").map(|share| share * torque_nm.abs());
+    dry.into_iter().chain([falling, of_load]).flatten().sum()
+}
+
 /// What `bowden diagnose` is asked: each recording by itself, and both together.
 ///
 /// # Errors
@@ -252,7 +298,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
         Table::new(&["fitted to itself", "mass kg", "arm m", "weight N m", "viscous N m s/rad", "dry N m"]);
     for (run, model) in runs.iter().zip(&own) {
         let Some(load) = model.parameters.load else { continue };
-        let dry_nm = model.effects.first().map_or(0.0, |effect| effect.parameters[0]);
+        let dry_nm = fitted_friction_nm(model, 0.0);
         let weight_nm = load.mass_kg * GRAVITY_M_S2 * load.arm_m;
         let values = [load.mass_kg, load.arm_m, weight_nm, load.viscous_nm_s_per_rad, dry_nm];
         table.row([run.name.clone()].into_iter().chain(values.map(|value| format!("{value:.4}"))));
@@ -279,6 +325,14 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     print(table.to_string());
 
     let [swing_up, ..] = answers(&studies(data)?, &mut print)?;
+    let named = |speed, torque| named_friction_nm(&swing_up.diagnosis, speed, torque);
+    let named_nm = friction_over_path_nm(data, SWING_UP, named)?;
+    if let Some((_, model)) = runs.iter().zip(&own).find(|(run, _)| run.name == SWING_UP) {
+        let fitted_nm = friction_over_path_nm(data, SWING_UP, |speed, _| fitted_friction_nm(model, speed))?;
+        print(format!(
+            "friction of the swing-up over its path: {named_nm:.3} N m named, {fitted_nm:.3} N m dry and viscous, fitted to itself\n"
+        ));
+    }
     Ok(vec![
         Mark {
             quantity: "quasi-direct drive, angle simulated from torque, friction from the other recording, rad",

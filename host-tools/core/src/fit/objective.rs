@@ -204,6 +204,19 @@ impl Objective {
         self
     }
 
+    /// The same recordings in free runs, where `model` is guided by a channel that is compared; `None` where nothing guides it but what its
+    /// inputs name.
+    #[must_use]
+    pub fn freely(&self, model: &JointModel) -> Option<Self> {
+        model.guided_by?;
+        let is_guide = |series: Series| series == Series::Guide;
+        let mut free = self.clone();
+        free.datasets = self.datasets.iter().map(|dataset| Arc::new(dataset.freely())).collect();
+        free.scales.retain(|(series, _)| !is_guide(*series));
+        free.noise_variances.retain(|(series, _)| !is_guide(*series));
+        Some(free)
+    }
+
     /// The same recordings, of those that are fitted to some held out as a whole; these come last.
     #[must_use]
     pub fn holding_out(&self, is_held_out: impl Fn(usize) -> bool) -> Self {

@@ -49,6 +49,8 @@ pub(super) struct Dataset {
     flutter: Vec<Range<usize>>,
     /// Tensions that stood at the lower end of their amplifier.
     pub(super) cut_at_zero: Vec<Channel>,
+    /// Whether nothing guides its replays but what its inputs name.
+    runs_freely: bool,
     /// Of these inputs, outputs and blocks, of which only the use may change after the first replay.
     memory: Memory,
 }
@@ -56,10 +58,24 @@ pub(super) struct Dataset {
 impl Dataset {
     /// The joint of this recording, where all recordings share `model`.
     pub(super) fn joint<'m>(&self, model: &'m JointModel) -> Cow<'m, JointModel> {
-        match &self.variation {
+        let joint = match &self.variation {
             Some(variation) => Cow::Owned(variation.apply(model)),
             None => Cow::Borrowed(model),
+        };
+        if self.runs_freely && joint.guided_by.is_some() {
+            return Cow::Owned(JointModel { guided_by: None, ..joint.into_owned() });
         }
+        joint
+    }
+
+    /// The same recording, with replays that nothing guides but what its inputs name.
+    pub(super) fn freely(&self) -> Self {
+        let mut free = Self { runs_freely: true, ..self.clone() };
+        if let Some(place) = free.measured.iter().position(|(series, _)| *series == Series::Guide) {
+            free.measured.remove(place);
+            free.moments.remove(place);
+        }
+        free
     }
 
     /// Groups of blocks over which the flutter of a series is compared. Of what guides a joint without tendons it is the answer to single counts
@@ -210,6 +226,7 @@ impl Dataset {
             blocks,
             flutter,
             cut_at_zero,
+            runs_freely: false,
             memory: Memory::default(),
         })
     }

@@ -37,8 +37,8 @@ fn of_a_joint_that_is_held_a_free_run_is_shown() {
     let free = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap();
     let held = free.clone().guided(&recording);
     let objective = Objective::new(&held, std::slice::from_ref(&recording), &[], true).unwrap();
-    let rmse =
-        |shown: &[Prediction]| objective.rmse(shown, Series::Channel(Channel::ThetaOut), Part::Training);
+    let angle = Series::Channel(Channel::ThetaOut);
+    let rmse = |shown: &[Prediction]| objective.rmse(shown, angle, Part::Training);
     let mut predictions = objective.predict(&held).unwrap();
     let when_held = rmse(&predictions);
     let guide_nm = predictions[0].guide_nm.clone();
@@ -51,6 +51,14 @@ fn of_a_joint_that_is_held_a_free_run_is_shown() {
     assert_eq!(predictions[0].channel(Channel::ThetaOut), replayed.channel(Channel::ThetaOut));
     let when_free = rmse(&predictions);
     assert!(when_free > 2.0 * when_held, "{when_held} and {when_free} rad");
+    // A fit in free runs compares these, and no torque beside them.
+    let free_runs = objective.freely(&held).unwrap();
+    assert_eq!(free_runs.scales(), [(angle, objective.scale(angle))]);
+    assert_eq!(
+        free_runs.predict(&held).unwrap()[0].channel(Channel::ThetaOut),
+        replayed.channel(Channel::ThetaOut)
+    );
+    assert_eq!(free_runs.residuals(&held).unwrap(), free_runs.compare(&[replayed]));
     // With tendons nothing is replaced.
     let tendons = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(500)).unwrap();
     let objective = Objective::new(&tendons, &[test_bench::swung(500)], &[], true).unwrap();
@@ -58,6 +66,7 @@ fn of_a_joint_that_is_held_a_free_run_is_shown() {
     let before = predictions.clone();
     objective.run_freely(&tendons, &mut predictions).unwrap();
     assert_eq!(predictions, before);
+    assert!(objective.freely(&tendons).is_none());
 }
 
 /// A pendulum that swings by itself, of which the duty is zero: what guides it is compared in 0.15 % of 20 N·m.
