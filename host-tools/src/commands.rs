@@ -82,6 +82,12 @@ fn load_study(
     rig: Option<&Path>,
     heldout: &[PathBuf],
 ) -> Result<LoadedStudy, Failure> {
+    if let Some(path) = recordings.iter().find(|path| LoadedStudy::is_rig(path)) {
+        return Err(Failure::bad_input(format!(
+            "{}: a rig where a recording or a study is expected; name it with --rig, and recordings (.csv, .csv.gz, .mcap) beside it",
+            path.display()
+        )));
+    }
     match (recordings.iter().find(|path| LoadedStudy::is_named_by(path)), rig) {
         (None, Some(rig)) => LoadedStudy::of_one_bench(rig, recordings, heldout),
         (None, None) => Err(Failure::bad_input(

@@ -40,13 +40,14 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::law;
 
+use crate::fit::free_run::solve_freely;
 use crate::fit::objective::{Objective, Part, Series};
-use crate::fit::solver::{FINE_STEP, FREE_RUN_STEPS, Solution, solve_in_rounds};
+use crate::fit::solver::{FINE_STEP, Solution, solve_in_rounds};
 use crate::fit::variation::Variation;
 use crate::hypothesis;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 use crate::recording::Recording;
 use crate::rig::{Rig, RigDocument, RigParameter, Undecided};
 use crate::study::{Bench, Role, Study};
@@ -278,15 +279,18 @@ impl Case<'_> {
             && let Some(free_runs) = objective.freely(model)
         {
             // What will be simulated runs freely. Effects are not chosen anew: far from what is there, all free runs are equally wrong.
-            let freely = |found: &JointModel| refine(&free_runs, model, found, &FREE_RUN_STEPS);
-            last = freely(&plain)?;
+            let freely = |found: &JointModel, held: &Solution| {
+                let free = Layout::of(model).free(model, found);
+                solve_freely(&free_runs, found, &free, &held.slopes().stds, FINAL_PATIENCE, &Quiet)
+            };
+            last = freely(&plain, &last)?;
             last.model.effects.extend(hums.iter().map(|(hum, _)| hum.law));
             stages.after = Stage::of(judge, &last.model)?;
             stages.recalibrated = if selected.chosen.is_empty() {
                 Stage::of(judge, &last.model)?
             } else {
                 let baseline = at_full_resolution(&selected.baseline.model, model);
-                Stage::of(judge, &freely(&baseline)?.model)?
+                Stage::of(judge, &freely(&baseline, &selected.baseline)?.model)?
             };
         }
         let traces = stages::traces(judge, model, &last.model)?;

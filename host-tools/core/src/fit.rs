@@ -2,6 +2,7 @@
 
 pub mod calibrated;
 pub mod free;
+pub mod free_run;
 pub mod identifiability;
 pub mod objective;
 pub mod observed;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::outcome::Failure;
 use crate::recording::Recording;
-use crate::rig::{Assignment, Rig, RigDocument, RigParameter};
+use crate::rig::{self, Assignment, Rig, RigDocument, RigParameter};
 use file::StudyFile;
 
 /// Value of `schema` in a study file.
@@ -104,6 +104,16 @@ impl LoadedStudy {
     #[must_use]
     pub fn is_named_by(path: &Path) -> bool {
         path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    }
+
+    /// Whether a file says that it is a rig. A rig is named by an option of its own; given as a recording it would be taken for a study.
+    #[must_use]
+    pub fn is_rig(path: &Path) -> bool {
+        Self::is_named_by(path)
+            && std::fs::read_to_string(path)
+                .ok()
+                .and_then(|text| text.parse::<toml::Table>().ok())
+                .is_some_and(|table| table.get("schema").and_then(toml::Value::as_str) == Some(rig::SCHEMA))
     }
 
     /// Reads a study file, its rig files and its recordings. Paths in the file are relative to its folder.

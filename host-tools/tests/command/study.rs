@@ -224,6 +224,11 @@ fn unusable_studies_are_refused_in_one_line() {
         (&["diagnose", "a.csv", "--out", "o"][..], "no rig; name it with --rig"),
         (&["diagnose", "s.toml", "--rig", "rig.toml", "--out", "o"], "names its rigs and recordings itself"),
         (&["fit", "s.toml", "a.csv", "--out", "o"], "names its rigs and recordings itself"),
+        (
+            &["diagnose", "rig.toml", "a.csv", "--out", "o"],
+            "rig.toml: a rig where a recording or a study is expected",
+        ),
+        (&["check", "rig.toml"], "rig.toml: a rig where a recording or a study is expected"),
         (&["check", "none.toml"], "none.toml: cannot be read"),
     ] {
         let (status, _, errors) = bowden(folder, arguments);

@@ -207,6 +207,9 @@ pub fn shown(data: &Path) -> Result<Vec<Shown>, Failure> {
     listed_recordings(&folder)?.into_iter().map(of).collect()
 }
 
+/// Dry friction of this actuator as its makers published it, N·m, of a run that they do not name.
+pub const PUBLISHED_DRY_NM: f64 = 0.1839;
+
 /// A friction torque, N·m, of a speed in rad/s and a reported torque in N·m, over the path that the pendulum of a recording travels: the work
 /// that it takes, over that path.
 ///
@@ -303,7 +306,8 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
         let values = [load.mass_kg, load.arm_m, weight_nm, load.viscous_nm_s_per_rad, dry_nm];
         table.row([run.name.clone()].into_iter().chain(values.map(|value| format!("{value:.4}"))));
     }
-    table.row(["published, run not named", "", "", "", "0.0471", "0.1839"].map(str::to_owned));
+    let published = format!("{PUBLISHED_DRY_NM}");
+    table.row(["published, run not named", "", "", "", "0.0471", &published].map(str::to_owned));
     print(table.to_string());
 
     let mut table = Table::new(&[
@@ -326,11 +330,13 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
 
     let [swing_up, ..] = answers(&studies(data)?, &mut print)?;
     let named = |speed, torque| named_friction_nm(&swing_up.diagnosis, speed, torque);
+    let at_rest_nm = named(0.0, 0.0);
     let named_nm = friction_over_path_nm(data, SWING_UP, named)?;
     if let Some((_, model)) = runs.iter().zip(&own).find(|(run, _)| run.name == SWING_UP) {
         let fitted_nm = friction_over_path_nm(data, SWING_UP, |speed, _| fitted_friction_nm(model, speed))?;
         print(format!(
-            "friction of the swing-up over its path: {named_nm:.3} N m named, {fitted_nm:.3} N m dry and viscous, fitted to itself\n"
+            "friction of the swing-up over its path: {named_nm:.3} N m named, {fitted_nm:.3} N m dry and viscous, fitted to itself\n\
+             at rest: {at_rest_nm:.3} N m named, {PUBLISHED_DRY_NM:.3} N m published\n"
         ));
     }
     Ok(vec![

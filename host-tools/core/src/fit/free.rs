@@ -157,6 +157,12 @@ impl Free {
         self
     }
 
+    /// The same parameter, believed to be what a fit found, its start, within the standard deviation `std` in the parameter's unit.
+    #[must_use]
+    pub fn believed_as_found(self, std: f64) -> Self {
+        self.believed_within(self.start, std / self.slope_at(self.start))
+    }
+
     /// The same parameter, believed to be `value` as firmly as before.
     #[must_use]
     pub fn believed_to_be(self, value: f64) -> Self {

@@ -1,10 +1,11 @@
 //! Recalibration of a rig: its nominal parameters fitted to all samples of recordings, and what stays unknown.
 
+use super::free_run::solve_freely;
 use super::identifiability::{Group, Sensitivity};
 use super::objective::{Objective, Part, Series};
 use super::observed::Use;
 use super::recalibrated::{own_of_effect, recalibrated, recalibrated_from};
-use super::solver::{FREE_RUN_STEPS, solve_rounds_watched, solve_watched};
+use super::solver::solve_watched;
 use super::variation::Variation;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
@@ -122,10 +123,11 @@ pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibrati
     let before = shown(model)?;
     let mut solution = solve_watched(objective, model, &free, PATIENCE, progress)?;
     if let Some(free_runs) = objective.freely(model) {
-        let found = solution.model;
+        let stds = &solution.slopes().stds;
+        let found = solution.model.clone();
         let mut free = recalibrated_from(model, &found);
         free.extend((0..found.effects.len()).flat_map(|effect| own_of_effect(&found, effect)));
-        solution = solve_rounds_watched(&free_runs, &found, &free, PATIENCE, &FREE_RUN_STEPS, progress)?;
+        solution = solve_freely(&free_runs, &found, &free, stds, PATIENCE, progress)?;
     }
     let after = shown(&solution.model)?;
     progress.stage("what the recordings can tell apart", 0);

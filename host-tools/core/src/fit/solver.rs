@@ -24,10 +24,6 @@ pub const COARSE_STEP: f64 = 0.1;
 /// Step that then finds the place.
 pub const FINE_STEP: f64 = 0.02;
 
-/// Steps of the rounds of a fit to free runs, which go on from where a fit of the guided joint ended. Over ten seconds a swing of half a hertz gets
-/// ahead by a third of a radian when the inertia is 2 % off: the finer step stays where the angle answers in proportion.
-pub const FREE_RUN_STEPS: [f64; 2] = [FINE_STEP, 0.1 * FINE_STEP];
-
 /// Longest first step of a round, in the optimiser's coordinate of the parameter that the residuals answer to least.
 const FIRST_STEP: f64 = 0.5;
 
