@@ -137,6 +137,16 @@ fn as_stated(recalibrated: &[Recalibrated]) -> String {
     )
 }
 
+/// What recalibration did to a parameter: its change, or where it is to where the rig file has zero, of which there is no share.
+fn change(p: &Recalibrated) -> String {
+    if p.nominal == 0.0 {
+        let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+        format!("{} 0 to {}{unit}", p.name(), short(p.fitted))
+    } else {
+        format!("{} {:+.0} %", p.name(), 100.0 * p.change())
+    }
+}
+
 /// Items as "a", "a and b", "a, b and c".
 fn listed(items: &[&str]) -> String {
     match items {
@@ -154,11 +164,7 @@ pub(super) fn summary(
     by_a_law: bool,
     heldout_loss: &StageLoss,
 ) -> String {
-    let changed: Vec<String> = recalibrated
-        .iter()
-        .filter(|p| p.is_wrong())
-        .map(|p| format!("{} {:+.0} %", p.name(), 100.0 * p.change()))
-        .collect();
+    let changed: Vec<String> = recalibrated.iter().filter(|p| p.is_wrong()).map(change).collect();
     let parameters = if changed.is_empty() {
         as_stated(recalibrated)
     } else {
@@ -199,7 +205,29 @@ pub(super) fn summary(
 #[cfg(test)]
 mod tests {
     use super::{listed, short, summary};
-    use crate::diagnose::verdict::{StageLoss, Verdict};
+    use crate::diagnose::verdict::{Recalibrated, StageLoss, Verdict};
+
+    /// A joint whose rig file has no mass, and whose arm turns out to be a tenth longer.
+    #[test]
+    fn a_parameter_that_was_zero_has_no_share_to_tell() {
+        let recalibrated = |parameter: &str, unit: &str, nominal: f64, fitted: f64| Recalibrated {
+            parameter: parameter.to_owned(),
+            bench: None,
+            nominal,
+            fitted,
+            std: Some(0.001),
+            unit: unit.to_owned(),
+            at_bound: false,
+        };
+        let found =
+            [recalibrated("load.mass_kg", "kg", 0.0, 0.512), recalibrated("load.arm_m", "m", 0.2, 0.22)];
+        let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 4.0 };
+        let said = summary(Verdict::Recalibrate, &[], &found, false, &loss);
+        assert!(
+            said.ends_with("Parameters that were wrong: load.mass_kg 0 to 0.512 kg, load.arm_m +10 %."),
+            "{said}"
+        );
+    }
 
     /// A loss that falls, one that falls too little to confirm anything, and one that rises.
     #[test]
