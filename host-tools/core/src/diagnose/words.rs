@@ -88,12 +88,11 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
     }
     let told = |(spec, value): &(&ParameterSpec, f64)| spec.searched || *value != spec.default;
     for (spec, value) in descriptor.parameters.iter().zip(active.parameters).filter(told).take(2) {
-        let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
         let name = spec.meaning;
         if spec.name.ends_with("time_s") || spec.name == "start_s" {
             let _ = write!(text, ", at {value:.2} s of {duration_s:.0} s");
         } else {
-            let _ = write!(text, ", {name} {}{unit}", short(value));
+            let _ = write!(text, ", {name} {}", quantity(value, spec.unit));
         }
     }
     let _ = write!(text, "; it {}.", on_unseen_data(improvement));
@@ -122,6 +121,11 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
+/// A value with its unit, if it has one.
+fn quantity(value: f64, unit: &str) -> String {
+    if unit == "1" { short(value) } else { format!("{} {unit}", short(value)) }
+}
+
 /// States that no parameter is significantly wrong, and the largest deviation.
 fn as_stated(recalibrated: &[Recalibrated]) -> String {
     let share = |p: &Recalibrated| p.change().abs() / wrong_from(&p.parameter);
@@ -140,8 +144,7 @@ fn as_stated(recalibrated: &[Recalibrated]) -> String {
 /// What recalibration did to a parameter: its change, or where it is to where the rig file has zero, of which there is no share.
 fn change(p: &Recalibrated) -> String {
     if p.nominal == 0.0 {
-        let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-        format!("{} 0 to {}{unit}", p.name(), short(p.fitted))
+        format!("{} 0 to {}", p.name(), quantity(p.fitted, &p.unit))
     } else {
         format!("{} {:+.0} %", p.name(), 100.0 * p.change())
     }

@@ -1,11 +1,12 @@
 //! Last fit of a joint without tendons, to free runs: they are what will be simulated. It goes on from where a fit of the guided joint ended.
 
-use super::free::{Free, Place};
+use super::free::Free;
 use super::objective::Objective;
 use super::solver::{FINE_STEP, Solution, solve_rounds_watched};
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
+use crate::rig::RigParameter;
 
 /// Steps of the difference quotients, one round each. Over ten seconds a swing of half a hertz gets ahead by a third of a radian when the
 /// inertia is 2 % off: the finer step stays where the angle answers in proportion.
@@ -29,7 +30,7 @@ pub fn solve_freely(
 ) -> Result<Solution, Failure> {
     let mut free = free.to_vec();
     for (free, std) in free.iter_mut().zip(stds) {
-        if let (Place::Effect { .. }, Some(std)) = (free.place(), std) {
+        if let (Some(RigParameter::Effect { .. }), Some(std)) = (free.parameter(found), std) {
             *free = free.believed_as_found(*std);
         }
     }
