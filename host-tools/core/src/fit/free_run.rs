@@ -28,13 +28,19 @@ pub fn solve_freely(
     patience: usize,
     progress: &dyn Progress,
 ) -> Result<Solution, Failure> {
+    let free = believing(free, found, stds);
+    solve_rounds_watched(free_runs, found, &free, patience, &STEPS, progress)
+}
+
+/// The same parameters, those of effects believed to be what was found.
+fn believing(free: &[Free], found: &JointModel, stds: &[Option<f64>]) -> Vec<Free> {
     let mut free = free.to_vec();
     for (free, std) in free.iter_mut().zip(stds) {
         if let (Some(RigParameter::Effect { .. }), Some(std)) = (free.parameter(found), std) {
             *free = free.believed_as_found(*std);
         }
     }
-    solve_rounds_watched(free_runs, found, &free, patience, &STEPS, progress)
+    free
 }
 
 #[cfg(test)]
@@ -43,6 +49,7 @@ mod tests {
     use bowden_model::effects::find;
 
     use super::*;
+    use crate::joint_model::OwnParameter;
     use crate::progress::Quiet;
     use crate::test_bench;
 
@@ -75,5 +82,29 @@ mod tests {
         let (both_nm, both_std_nm) = fit(told_nm, Some(std_nm));
         assert!((both_nm - (0.1 + 2.0 * std_nm)).abs() < 0.2 * std_nm, "{both_nm} ± {std_nm} N m");
         assert!((both_std_nm * 2.0_f64.sqrt() / std_nm - 1.0).abs() < 0.1, "{both_std_nm} of {std_nm} N m");
+    }
+
+    /// What a bench has for itself of an effect as well, and no parameter of the rig.
+    #[test]
+    fn effects_are_believed_whoever_has_them() {
+        let friction = find("joint_coulomb_friction").unwrap();
+        let recording = test_bench::turned(10, &[]);
+        let mut model = JointModel::from_rig(&test_bench::direct_rig(), &recording).unwrap();
+        model.effects.push(ActiveEffect::with_defaults(friction).with("torque_nm", 0.1));
+        let parameter = RigParameter::Effect { descriptor: friction.descriptor(), index: 0 };
+        model.own.values.push(OwnParameter { bench: 0, parameter, value: None });
+        let free = [
+            Free::effect(&model, 0, 0).unwrap(),
+            Free::own(&model, 0).unwrap(),
+            Free::nominal(&model, "load", "inertia_kg_m2").unwrap(),
+        ];
+        let believed = believing(&free, &model, &[Some(0.02); 3]);
+        for (before, after) in free.iter().zip(&believed).take(2) {
+            assert_eq!(before.prior_slope(), 0.0);
+            // A standard deviation away from what was found is one.
+            let x = 0.02 / after.slope_at(0.1);
+            assert!((after.prior_residual(x) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(believed[2].prior_slope(), free[2].prior_slope());
     }
 }
