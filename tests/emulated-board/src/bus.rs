@@ -25,6 +25,7 @@ use crate::peripherals::rcc::{Bank, HSI_HZ, Rcc, ResetCause};
 use crate::peripherals::spi::Spi;
 use crate::peripherals::syscfg::Syscfg;
 use crate::peripherals::timer::Timer;
+use crate::peripherals::timers::Timers;
 use crate::peripherals::usb::Usb;
 use crate::peripherals::watchdog::Watchdog;
 use crate::rig::{Input, Rig};
@@ -67,7 +68,7 @@ pub(crate) struct Bus {
     dbgmcu: Dbgmcu,
     gpio: [Gpio; PORTS],
     output_levels: [u16; PORTS],
-    timers: Vec<Timer>,
+    timers: Timers,
     /// TIM1.
     pub tim1: AdvancedTimer,
     adc: [Adc; 2],
@@ -78,6 +79,8 @@ pub(crate) struct Bus {
     usb: Usb,
     /// The host at the other end of the cable.
     pub host: UsbHost,
+    /// Cycle at which it polls next, with its time and the clock for which that holds: asked for far more often than it changes.
+    host_polls: Cell<(f64, Clock, u64)>,
     /// Flash interface.
     pub flash: Flash,
     watchdog: Watchdog,
@@ -129,7 +132,7 @@ impl Bus {
             dbgmcu: Dbgmcu::new(),
             gpio: std::array::from_fn(Gpio::new),
             output_levels: [0; PORTS],
-            timers: TIMERS.iter().map(|t| Timer::new(t.3, t.4, t.5)).collect(),
+            timers: Timers::new(TIMERS.iter().map(|t| Timer::new(t.3, t.4, t.5)).collect()),
             tim1: AdvancedTimer::new(),
             adc: [Adc::new(), Adc::new()],
             adc_common: Common::new(),
@@ -138,6 +141,7 @@ impl Bus {
             dmamux: Dmamux::new(),
             usb: Usb::new(),
             host: UsbHost::new(),
+            host_polls: Cell::new((0.0, Clock::new(HSI_HZ), 0)),
             flash: Flash::new(),
             watchdog: Watchdog::new(),
             rig,
@@ -178,9 +182,7 @@ impl Bus {
         for port in &mut self.gpio {
             port.reset();
         }
-        for timer in &mut self.timers {
-            timer.reset();
-        }
+        self.timers.reset_all();
         self.tim1.reset();
         self.adc = [Adc::new(), Adc::new()];
         self.adc_common = Common::new();
@@ -229,8 +231,8 @@ impl Bus {
 
     /// Cycle of the next event of any peripheral.
     pub(crate) fn next_event(&self) -> u64 {
-        let timers = self.timers.iter().map(Timer::next_event).min().unwrap_or(NEVER);
-        timers
+        self.timers
+            .next_event()
             .min(self.tim1.next_event())
             .min(self.tim1.break_event())
             .min(self.driver_wakes)
@@ -241,16 +243,25 @@ impl Bus {
             .min(self.spi[1].next_event())
             .min(self.flash.next_event())
             .min(self.watchdog.next_event())
-            .min(self.clock.cycle_at(self.host.next_s()))
+            .min(self.host_polls())
+    }
+
+    /// Cycle at which the host polls next.
+    fn host_polls(&self) -> u64 {
+        let (next_s, clock) = (self.host.next_s(), self.clock);
+        match self.host_polls.get() {
+            (of_s, of_clock, cycle) if of_s == next_s && of_clock == clock => cycle,
+            _ => {
+                let cycle = clock.cycle_at(next_s);
+                self.host_polls.set((next_s, clock, cycle));
+                cycle
+            }
+        }
     }
 
     /// Does what is due at cycle `at`, which must be that of [`Self::next_event`].
     pub(crate) fn run_event(&mut self, at: u64) {
-        for timer in &mut self.timers {
-            if timer.next_event() <= at {
-                timer.advance(at);
-            }
-        }
+        self.timers.advance(at);
         if self.tim1.next_event() <= at {
             self.tim1.advance(at);
             self.tim1_changed(at);
@@ -285,7 +296,7 @@ impl Bus {
         }
         let now_s = self.seconds(at);
         // Compared in cycles, as in `next_event`: seconds round.
-        if self.clock.cycle_at(self.host.next_s()) <= at {
+        if self.host_polls() <= at {
             match self.host.poll(&mut self.usb, now_s) {
                 Ok(moved) => {
                     if !moved.out.is_empty() {
@@ -359,8 +370,7 @@ impl Bus {
     /// Interrupt lines that are high, bit n for interrupt n.
     pub(crate) fn lines(&self) -> u128 {
         let bit = |high: bool, interrupt: u32| u128::from(high) << interrupt;
-        let timers = self.timers.iter().fold(0, |lines, timer| lines | bit(timer.line(), timer.interrupt));
-        timers
+        self.timers.lines()
             | bit(self.tim1.break_line(), 24)
             | bit(self.tim1.update_line(), 25)
             | bit(self.adc[0].line() || self.adc[1].line(), 18)

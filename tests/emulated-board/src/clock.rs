@@ -1,7 +1,7 @@
 //! Board time: cycles of HCLK to seconds across changes of its frequency.
 
 /// Conversion between cycles and seconds.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clock {
     hz: u64,
     since_cycle: u64,

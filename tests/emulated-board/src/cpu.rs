@@ -66,9 +66,29 @@ pub(crate) fn read_word(uc: &Uc<'_>, address: u32) -> Result<u32, BoardError> {
     Ok(u32::from_le_bytes(bytes))
 }
 
-/// Writes a word of memory.
-pub(crate) fn write_word(uc: &mut Uc<'_>, address: u32, value: u32) -> Result<(), BoardError> {
-    uc.mem_write(u64::from(address), &value.to_le_bytes())
+/// Words of a frame at most: its bytes are moved together, which the simulator does in the time of one word.
+const FRAME_WORDS: usize = 26;
+
+/// Reads up to [`FRAME_WORDS`] words of memory.
+pub(crate) fn read_words(uc: &Uc<'_>, address: u32, words: &mut [u32]) -> Result<(), BoardError> {
+    let mut bytes = [0; 4 * FRAME_WORDS];
+    let bytes = &mut bytes[..4 * words.len()];
+    uc.mem_read(u64::from(address), bytes)
+        .map_err(|_| BoardError::Simulator(format!("no memory at {address:#010x} for the stack")))?;
+    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks().0) {
+        *word = u32::from_le_bytes(*bytes);
+    }
+    Ok(())
+}
+
+/// Writes up to [`FRAME_WORDS`] words of memory.
+pub(crate) fn write_words(uc: &mut Uc<'_>, address: u32, words: &[u32]) -> Result<(), BoardError> {
+    let mut bytes = [0; 4 * FRAME_WORDS];
+    let bytes = &mut bytes[..4 * words.len()];
+    for (bytes, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
+        *bytes = word.to_le_bytes();
+    }
+    uc.mem_write(u64::from(address), bytes)
         .map_err(|_| BoardError::Simulator(format!("no memory at {address:#010x} for the stack")))
 }
 
@@ -170,7 +190,7 @@ impl Cpu {
         machine.event = false;
         machine.sleep = Sleep::Awake;
         machine.measure.abandon();
-        machine.forget_ram_code();
+        machine.forget_blocks();
         self.boots += 1;
         for register in
             [R::R0, R::R1, R::R2, R::R3, R::R4, R::R5, R::R6, R::R7, R::R8, R::R9, R::R10, R::R11, R::R12]
@@ -368,8 +388,13 @@ fn settle(uc: &mut Uc<'_>) {
         let moved = move_dma(uc);
         let machine = uc.get_data_mut();
         let stopped = machine.bus.failure.is_some() || machine.bus.reset_request.is_some();
-        if stopped || (at > now && !moved) {
+        if stopped {
             machine.refresh();
+            return;
+        }
+        if at > now && !moved {
+            // Nothing has happened on the bus since it was asked.
+            machine.refresh_before(at);
             return;
         }
     }

@@ -5,7 +5,7 @@
 
 use unicorn_engine::{RegisterARM as R, Unicorn};
 
-use crate::cpu::{read_word, write_word};
+use crate::cpu::{read_word, read_words, write_words};
 use crate::error::BoardError;
 use crate::machine::{Machine, Sleep};
 use crate::processor_fault::{FORCED, HARD_FAULT_PRIORITY};
@@ -82,20 +82,21 @@ pub(crate) fn enter(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<()
         uc.get_data_mut().fault(what, link);
         return Ok(());
     }
-    for (k, register) in CORE.into_iter().enumerate() {
+    let mut words = [0; FP_FRAME as usize / 4];
+    for (word, register) in words.iter_mut().zip(CORE) {
         let value = uc.reg_read(register)? as u32;
-        let value = if register == R::PC { value & !1 } else { value };
-        write_word(uc, frame + 4 * k as u32, value)?;
+        *word = if register == R::PC { value & !1 } else { value };
     }
-    write_word(uc, frame + 28, xpsr & !0x200 | aligned_up << 9 | 1 << 24)?;
+    words[7] = xpsr & !0x200 | aligned_up << 9 | 1 << 24;
     if fp {
-        for (k, register) in FP.into_iter().enumerate() {
-            let value = uc.reg_read(register)? as u32;
-            write_word(uc, frame + 0x20 + 4 * k as u32, value)?;
+        for (word, register) in words[8..].iter_mut().zip(FP) {
+            *word = uc.reg_read(register)? as u32;
         }
-        let fpscr = uc.reg_read(R::FPSCR)? as u32;
-        write_word(uc, frame + 0x60, fpscr)?;
+        words[24] = uc.reg_read(R::FPSCR)? as u32;
+        write_words(uc, frame, &words[..25])?;
         uc.reg_write(R::CONTROL, control & !FP_ACTIVE)?;
+    } else {
+        write_words(uc, frame, &words[..8])?;
     }
     uc.reg_write(R::SP, u64::from(frame))?;
     uc.reg_write(R::LR, u64::from(exc_return))?;
@@ -187,20 +188,19 @@ pub(crate) fn leave(uc: &mut Uc<'_>) -> Result<(), BoardError> {
     let outer = machine.scs.stack.last().map_or(0, |active| u32::from(active.exception));
     let fp = exc_return & 0x10 == 0;
     let frame = uc.reg_read(R::SP)? as u32;
-    for (k, register) in CORE.into_iter().take(6).enumerate() {
-        let value = read_word(uc, frame + 4 * k as u32)?;
-        uc.reg_write(register, u64::from(value))?;
+    let mut words = [0; FP_FRAME as usize / 4];
+    read_words(uc, frame, &mut words[..if fp { 25 } else { 8 }])?;
+    for (word, register) in words.iter().zip(CORE).take(6) {
+        uc.reg_write(register, u64::from(*word))?;
     }
     if fp {
-        for (k, register) in FP.into_iter().enumerate() {
-            let value = read_word(uc, frame + 0x20 + 4 * k as u32)?;
-            uc.reg_write(register, u64::from(value))?;
+        for (word, register) in words[8..].iter().zip(FP) {
+            uc.reg_write(register, u64::from(*word))?;
         }
-        let fpscr = read_word(uc, frame + 0x60)?;
-        uc.reg_write(R::FPSCR, u64::from(fpscr))?;
+        uc.reg_write(R::FPSCR, u64::from(words[24]))?;
     }
     uc.reg_write(R::CONTROL, if fp { control | FP_ACTIVE } else { control })?;
-    let (pc, xpsr) = (read_word(uc, frame + 24)?, read_word(uc, frame + 28)?);
+    let (pc, xpsr) = (words[6], words[7]);
     uc.reg_write(R::IPSR, u64::from(outer))?;
     uc.reg_write(R::XPSR_NZCVQG, u64::from(xpsr & !0x1ff | outer))?;
     let popped = frame + if fp { FP_FRAME } else { BASIC_FRAME };

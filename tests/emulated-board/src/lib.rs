@@ -34,6 +34,7 @@
 
 pub mod accesses;
 mod analog;
+mod block_costs;
 mod board;
 mod bus;
 mod clock;

@@ -1,14 +1,13 @@
 //! State that the simulator's hooks share: counters, pending stops, core peripherals, bus.
 
-use std::collections::HashMap;
-
 use crate::accesses::{Accesses, Fetches};
+use crate::block_costs::BlockCosts;
 use crate::bus::Bus;
 use crate::cost::{BlockCost, MOST_TAKEN, TAKEN, block_cost};
 use crate::elf::Image;
 use crate::error::{BoardError, Refusal};
 use crate::measure::{Measure, Moment};
-use crate::memory_map::{CCM, CORE, FLASH};
+use crate::memory_map::{CORE, FLASH};
 use crate::processor_fault::{Cause, ProcessorFault};
 use crate::scs::{FIRST_INTERRUPT, Scs};
 
@@ -35,14 +34,6 @@ pub(crate) enum Trap {
     SupervisorCall,
     /// WFI at this address.
     WaitForInterrupt(u32),
-}
-
-/// Cost of a block that was seen before.
-#[derive(Debug, Clone, Copy, Default)]
-struct Cached {
-    bytes: u32,
-    cost: BlockCost,
-    fetches: Fetches,
 }
 
 /// Counters of a run.
@@ -114,9 +105,7 @@ pub(crate) struct Machine {
     pub measure: Measure,
     /// Number, minimum, maximum and sum of cycles from an update event of TIM1 to the `ADC1_2` handler.
     pub tick_latency: [u64; 4],
-    flash_costs: Vec<Cached>,
-    ccm_costs: Vec<Cached>,
-    other_costs: HashMap<u32, Cached>,
+    block_costs: BlockCosts,
 }
 
 impl Machine {
@@ -146,9 +135,7 @@ impl Machine {
             processor_fault: None,
             scs: Scs::new(FLASH.start),
             bus,
-            flash_costs: vec![Cached::default(); used / 2 + 1],
-            ccm_costs: vec![Cached::default(); CCM.size as usize / 2],
-            other_costs: HashMap::new(),
+            block_costs: BlockCosts::new(used, image.ccm_start()),
             measure: Measure::default(),
             tick_latency: [0; 4],
             image,
@@ -184,52 +171,39 @@ impl Machine {
         self.block_cost = block_cost(self.block, done);
     }
 
-    fn cached(&mut self, address: u32) -> &mut Cached {
-        let slot = |start: u32| (address.wrapping_sub(start) / 2) as usize;
-        let (in_flash, in_ccm) = (slot(FLASH.start), slot(self.image.ccm_start()));
-        if let Some(cached) = self.flash_costs.get_mut(in_flash) {
-            cached
-        } else if let Some(cached) = self.ccm_costs.get_mut(in_ccm) {
-            cached
-        } else {
-            self.other_costs.entry(address).or_default()
-        }
-    }
-
     /// Takes note of a block of `bytes` at `address`; false if its cost is not known yet.
     pub(crate) fn begin_block(&mut self, address: u32, bytes: u32) -> bool {
-        let Cached { bytes: known, cost, fetches } = *self.cached(address);
-        if known != bytes {
-            return false;
-        }
+        let Some(known) = self.block_costs.find(address, bytes) else { return false };
+        (self.block_cost, self.block_fetches) = (known.cost, known.fetches);
         self.block = address;
         self.block_end = address + bytes;
-        (self.block_cost, self.block_fetches) = (cost, fetches);
         true
     }
 
     /// Learns the cost of the block at `address` from its `code`.
     pub(crate) fn learn_block(&mut self, address: u32, code: &[u8]) {
-        let bytes = code.len() as u32;
-        *self.cached(address) =
-            Cached { bytes, cost: block_cost(address, code), fetches: Fetches::of(address, bytes) };
+        self.block_costs.learn(address, code);
     }
 
-    /// Forgets the costs of code outside flash: it may have been replaced.
-    pub(crate) fn forget_ram_code(&mut self) {
-        self.ccm_costs.fill(Cached::default());
-        self.other_costs.clear();
+    /// Forgets what blocks cost: code in RAM may have been replaced.
+    pub(crate) fn forget_blocks(&mut self) {
+        self.block_costs.forget();
     }
 
     /// Brings interrupt lines and the time of the next event up to date.
     pub(crate) fn refresh(&mut self) {
+        self.refresh_before(self.bus.next_event());
+    }
+
+    /// The same where the next event of the bus is known.
+    pub(crate) fn refresh_before(&mut self, next_of_bus: u64) {
         if self.scs.raise(self.bus.lines()) {
             self.look = true;
         }
         if self.bus.nmi() && self.scs.raise_nmi() {
             self.look = true;
         }
-        self.next_event = self.bus.next_event().min(self.scs.next_event());
+        self.next_event = next_of_bus.min(self.scs.next_event());
     }
 
     /// Takes note of an exception whose handler starts now.

@@ -111,7 +111,7 @@ impl Bus {
 
     fn read_word(&mut self, unit: Unit, offset: u32, now: u64) -> Result<u32, Refusal> {
         match unit {
-            Unit::Timer(index) => self.timers[index].read(offset, now),
+            Unit::Timer(index) => self.timers.read(index, offset, now),
             Unit::Crs => self.crs.read(offset),
             Unit::Watchdog => self.watchdog.read(offset),
             Unit::Spi(index) => self.spi[index].read(offset, 4),
@@ -166,7 +166,7 @@ impl Bus {
     fn write_word(&mut self, unit: Unit, offset: u32, value: u32, now: u64) -> Result<(), Refusal> {
         let hz = self.clock.hz();
         match unit {
-            Unit::Timer(index) => self.timers[index].write(offset, value, now),
+            Unit::Timer(index) => self.timers.write(index, offset, value, now),
             Unit::Crs => self.crs.write(offset, value),
             Unit::Watchdog => self.watchdog.write(offset, value, now, hz),
             Unit::Spi(index) => self.spi[index].write(offset, 4, value, now),
@@ -261,7 +261,7 @@ impl Bus {
 
     fn reset_unit(&mut self, bank: Bank, bit: u32, now: u64) {
         if let Some(index) = TIMERS.iter().position(|timer| timer.1 == bank && timer.2 == bit) {
-            self.timers[index].reset();
+            self.timers.reset(index);
             return;
         }
         match (bank, bit) {

@@ -43,6 +43,9 @@ pub(crate) struct Beat {
 pub(crate) struct Dma {
     channels: [Channel; 2 * CHANNELS],
     flags: [u32; 2],
+    /// Channels that are enabled and have items left, and interrupt lines that are high: asked for far more often than they change.
+    waiting: u32,
+    lines: u128,
 }
 
 impl Dma {
@@ -55,15 +58,26 @@ impl Dma {
     pub(crate) fn reset(&mut self, controller: usize) {
         self.channels[controller * CHANNELS..(controller + 1) * CHANNELS].fill(Channel::default());
         self.flags[controller] = 0;
+        self.follow_all();
+    }
+
+    /// Follows a change of `channel` or of its flags.
+    fn follow(&mut self, channel: usize) {
+        let Channel { control, count, .. } = self.channels[channel];
+        let waits = control & ENABLE != 0 && count > 0;
+        self.waiting = self.waiting & !(1 << channel) | u32::from(waits) << channel;
+        let flags = self.flags[channel / CHANNELS] >> (4 * (channel % CHANNELS));
+        let (line, high) = (INTERRUPTS[channel], control & flags & 0xe != 0);
+        self.lines = self.lines & !(1 << line) | u128::from(high) << line;
+    }
+
+    fn follow_all(&mut self) {
+        (0..2 * CHANNELS).for_each(|channel| self.follow(channel));
     }
 
     /// Channels that are enabled and have items left.
     pub(crate) fn waiting(&self) -> u32 {
-        (0..2 * CHANNELS)
-            .filter(|channel| {
-                self.channels[*channel].control & ENABLE != 0 && self.channels[*channel].count > 0
-            })
-            .fold(0, |set, channel| set | 1 << channel)
+        self.waiting
     }
 
     /// Priority level of `channel`, 3 the highest.
@@ -98,25 +112,19 @@ impl Dma {
                 state.moved = 0;
             }
         }
+        self.follow(channel);
     }
 
     /// A bus error of `channel` (RM0440, DMA): TEIF, and the channel is off.
     pub(crate) fn fail(&mut self, channel: usize) {
         self.channels[channel].control &= !ENABLE;
         self.flags[channel / CHANNELS] |= 9 << (4 * (channel % CHANNELS));
+        self.follow(channel);
     }
 
     /// Interrupt lines that are high.
     pub(crate) fn lines(&self) -> u128 {
-        if self.flags == [0, 0] {
-            return 0;
-        }
-        (0..2 * CHANNELS)
-            .filter(|channel| {
-                let flags = self.flags[channel / CHANNELS] >> (4 * (channel % CHANNELS));
-                self.channels[*channel].control & flags & 0xe != 0
-            })
-            .fold(0, |lines, channel| lines | 1_u128 << INTERRUPTS[channel])
+        self.lines
     }
 
     fn locate(controller: usize, offset: u32) -> Result<(usize, u32), Refusal> {
@@ -153,6 +161,7 @@ impl Dma {
                     self.flags[controller] &= !(1 << (4 * channel));
                 }
             }
+            self.follow_all();
             return Ok(());
         }
         let (channel, register) = Self::locate(controller, offset)?;
@@ -180,6 +189,7 @@ impl Dma {
             0xc => state.memory = value,
             _ => return Err(Refusal::no_register(offset)),
         }
+        self.follow(channel);
         Ok(())
     }
 }

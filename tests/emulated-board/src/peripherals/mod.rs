@@ -19,6 +19,7 @@ pub(crate) mod spi;
 pub(crate) mod syscfg;
 pub(crate) mod system_memory;
 pub(crate) mod timer;
+pub(crate) mod timers;
 pub(crate) mod usb;
 pub(crate) mod watchdog;
 
