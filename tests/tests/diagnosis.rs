@@ -28,6 +28,9 @@ use virtual_bench::{
 /// Length of the diagnosed recordings, s.
 const SECONDS: f64 = 16.0;
 
+/// Length where several things are hidden, s.
+const LONG_S: f64 = 24.0;
+
 /// Length of the second recordings, s.
 const SECOND_SECONDS: f64 = 12.0;
 
@@ -52,9 +55,9 @@ impl Outcome {
     }
 
     /// A bench of the proof.
-    fn of_plan(seed: u64, name: &str) -> Self {
+    fn of_plan(seed: u64, name: &str, seconds: f64) -> Self {
         let plan = plans(seed).into_iter().find(|plan| plan.name == name).unwrap();
-        Self::over(&plan.case().unwrap(), TRAINING_S, &[])
+        Self::over(&plan.case().unwrap(), seconds, &[])
     }
 
     fn of_recorded(recorded: Recorded, case: &Case, seconds: f64, asked: &[&str]) -> Self {
@@ -249,7 +252,7 @@ fn tensions_that_were_not_recorded_are_predicted_no_worse() {
 /// warming, and how much a watt does is not in the rig file.
 #[test]
 fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
-    let outcome = Outcome::of_plan(1, "pair/15");
+    let outcome = Outcome::of_plan(1, "pair/15", LONG_S);
     assert_eq!(outcome.ids(), ["winding_heating", "wrap_angle_varies_with_pose"]);
     let resistance = outcome.diagnosis.recalibrated.iter().find(|p| p.parameter == "motor.resistance_ohm");
     let resistance = resistance.unwrap();
@@ -261,7 +264,7 @@ fn what_a_parameter_had_taken_the_place_of_is_found_beside_another_effect() {
 /// much as any law.
 #[test]
 fn a_reading_that_sets_in_is_no_wrong_zero() {
-    let outcome = Outcome::of_plan(606, "mixed/01");
+    let outcome = Outcome::of_plan(606, "mixed/01", TRAINING_S);
     assert_eq!(outcome.ids(), ["joint_spring"]);
     let [law] = &outcome.diagnosis.laws[..] else { panic!("{:?}", outcome.diagnosis.laws) };
     assert_eq!(law.channel.as_deref(), Some("f3_n"), "{law:?}");
@@ -275,7 +278,7 @@ fn a_reading_that_sets_in_is_no_wrong_zero() {
 /// Dry friction of the joint, a friction that prefers a direction and a wrong zero: none is worth its name alone, each is beside the others.
 #[test]
 fn what_is_worth_little_alone_is_found_beside_the_rest() {
-    let outcome = Outcome::of_plan(606, "triple/00");
+    let outcome = Outcome::of_plan(606, "triple/00", LONG_S);
     assert_eq!(outcome.ids(), ["asymmetric_friction", "joint_coulomb_friction", "sensor_offset"]);
     outcome.predicts_within(0.5);
 }
@@ -284,7 +287,7 @@ fn what_is_worth_little_alone_is_found_beside_the_rest() {
 /// is ordinary and at its resolution, and takes less than a hundredth off the loss of the rig that is written.
 #[test]
 fn what_the_written_rig_does_not_gain_by_is_not_found() {
-    let outcome = Outcome::of_plan(1, "parameters/23");
+    let outcome = Outcome::of_plan(1, "parameters/23", TRAINING_S);
     assert_eq!(outcome.diagnosis.verdict, Verdict::Recalibrate);
     assert_eq!(outcome.diagnosis.effects, []);
 }

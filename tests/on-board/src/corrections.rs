@@ -128,22 +128,37 @@ impl Case {
         Ok(error_of(&self.trial.natively()?, self.error).rms)
     }
 
+    /// The run with the effect and these parameters.
+    fn trial_with(&self, stored: &Stored) -> Trial {
+        let effects = vec![self.effect.clone()];
+        Trial { effects, parameters: stored.parameters.clone(), ..self.trial.clone() }
+    }
+
+    fn named(&self) -> impl Fn(Failure) -> Failure {
+        let name = self.name;
+        move |Failure(text)| Failure(format!("{name}: {text}"))
+    }
+
+    /// Error of the joint with its effect and these parameters, with the control code alone.
+    pub fn natively(&self, stored: &Stored) -> Outcome<f64> {
+        let course = self.trial_with(stored).natively().map_err(self.named())?;
+        Ok(error_of(&course, self.error).rms)
+    }
+
     /// Errors of the joint with its effect and these parameters.
     pub fn errors(&self, elf: &[u8], stored: &Stored) -> Outcome<Errors> {
-        let effects = vec![self.effect.clone()];
-        let trial = Trial { effects, parameters: stored.parameters.clone(), ..self.trial.clone() };
-        let named = |Failure(text)| Failure(format!("{}: {text}", self.name));
-        let natively = error_of(&trial.natively().map_err(named)?, self.error).rms;
+        let natively = self.natively(stored)?;
+        let trial = self.trial_with(stored);
         let board = Board::builder(elf)
             .bench(&trial.bench, &trial.effects)
             .seed(trial.seed)
             .flash_image(&stored.flash);
         let mut host = Host::connect(board.build()?)?;
-        host.make_ready().map_err(named)?;
+        host.make_ready().map_err(self.named())?;
         if trial.homes {
-            host.home().map_err(named)?;
+            host.home().map_err(self.named())?;
         }
-        let on_image = error_of(&trial.follow(&mut host).map_err(named)?, self.error).rms;
+        let on_image = error_of(&trial.follow(&mut host).map_err(self.named())?, self.error).rms;
         Ok(Errors { on_image, natively })
     }
 }
