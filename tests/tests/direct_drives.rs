@@ -44,3 +44,15 @@ fn drag_with_the_square_of_speed_is_put_into_a_law() {
     assert_eq!(one.diagnosis.verdict, Verdict::Unexplained);
     assert!(one.is_right(), "{}", one.said());
 }
+
+/// The motion hardly leaves one side of where the spring is at rest. Fitted with the slopes of the joint without it, a spring fell behind an end
+/// stop there, beside which a law then made up for the rest: 2.3 rad in a free run.
+#[test]
+fn a_spring_that_is_bent_to_one_side_is_no_end_stop() {
+    let one = examined(2504, &[DirectKind::Spring]);
+    assert!(one.is_right(), "{}", one.said());
+    let strength = one.strength_ratio().unwrap();
+    assert!((strength - 1.0).abs() < 0.02, "spring {strength} times the true one");
+    let [given, _, diagnosed] = one.free_run_rad();
+    assert!(given > 1.0 && diagnosed < 0.02, "{given} to {diagnosed} rad");
+}

@@ -24,7 +24,7 @@ fn is_of_the_other_end(one: &Descriptor, other: &Descriptor) -> bool {
 }
 
 /// Whether rotor and joint of `model` answer to the same torques.
-fn turns_as_one(model: &JointModel) -> bool {
+pub(super) fn turns_as_one(model: &JointModel) -> bool {
     model.parameters.tendon.is_none() && model.drive().is_ok_and(|drive| drive != Drive::Angle)
 }
 

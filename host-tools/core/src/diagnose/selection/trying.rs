@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
 use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
+use crate::diagnose::one_body::turns_as_one;
 use crate::diagnose::onset::{between_recordings, moment_of};
 use crate::diagnose::screening::{Present, Screened, screen};
 use crate::fit::solver::{FINE_STEP, Known, Slopes, solve_for_ranking};
@@ -133,11 +134,17 @@ impl Search<'_> {
         // Sensitivities of the present model mislead where stick-slip makes the loss nonlinear. A candidate whose estimate would still
         // rank first is refitted with its own.
         let before = present.loss;
-        let best = fits.iter().map(|(_, fitted)| fitted.loss).fold(f64::INFINITY, f64::min);
+        let first = fits.iter().min_by(|(_, a), (_, b)| a.loss.total_cmp(&b.loss));
+        let (best, promise) =
+            first.map_or((f64::INFINITY, 0.0), |(place, fitted)| (fitted.loss, ranked[*place].gain));
+        // So is one far behind another of which less was promised, where a replay takes little: without tendons.
+        let is_quick = turns_as_one(&present.solution.model);
         fits.par_iter_mut().try_for_each(|(place, fitted)| {
             let screened = &ranked[*place];
             let astray = fitted.loss > (1.0 - KEPT_PROMISE * screened.gain) * before;
-            if astray && (1.0 - screened.gain) * before < best && !progress.interrupted() {
+            let may_be_first = astray && (1.0 - screened.gain) * before < best;
+            let overtaken = is_quick && screened.gain > promise && fitted.loss > BEHIND * best;
+            if (may_be_first || overtaken) && !progress.interrupted() {
                 let own = self.fit_new(present, slopes, screened, false)?;
                 if own.loss < fitted.loss {
                     *fitted = own;
