@@ -66,32 +66,6 @@ pub(crate) fn read_word(uc: &Uc<'_>, address: u32) -> Result<u32, BoardError> {
     Ok(u32::from_le_bytes(bytes))
 }
 
-/// Words of a frame at most: its bytes are moved together, which the simulator does in the time of one word.
-const FRAME_WORDS: usize = 26;
-
-/// Reads up to [`FRAME_WORDS`] words of memory.
-pub(crate) fn read_words(uc: &Uc<'_>, address: u32, words: &mut [u32]) -> Result<(), BoardError> {
-    let mut bytes = [0; 4 * FRAME_WORDS];
-    let bytes = &mut bytes[..4 * words.len()];
-    uc.mem_read(u64::from(address), bytes)
-        .map_err(|_| BoardError::Simulator(format!("no memory at {address:#010x} for the stack")))?;
-    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks().0) {
-        *word = u32::from_le_bytes(*bytes);
-    }
-    Ok(())
-}
-
-/// Writes up to [`FRAME_WORDS`] words of memory.
-pub(crate) fn write_words(uc: &mut Uc<'_>, address: u32, words: &[u32]) -> Result<(), BoardError> {
-    let mut bytes = [0; 4 * FRAME_WORDS];
-    let bytes = &mut bytes[..4 * words.len()];
-    for (bytes, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
-        *bytes = word.to_le_bytes();
-    }
-    uc.mem_write(u64::from(address), bytes)
-        .map_err(|_| BoardError::Simulator(format!("no memory at {address:#010x} for the stack")))
-}
-
 /// Core with its memories.
 pub(crate) struct Cpu {
     uc: Uc<'static>,

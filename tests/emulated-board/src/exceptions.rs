@@ -5,7 +5,7 @@
 
 use unicorn_engine::{RegisterARM as R, Unicorn};
 
-use crate::cpu::{read_word, read_words, write_words};
+use crate::cpu::read_word;
 use crate::error::BoardError;
 use crate::machine::{Machine, Sleep};
 use crate::processor_fault::{FORCED, HARD_FAULT_PRIORITY};
@@ -19,6 +19,11 @@ const RETURN_CYCLES: u64 = 10;
 const TAIL_CHAIN_CYCLES: u64 = 6;
 const BASIC_FRAME: u32 = 0x20;
 const FP_FRAME: u32 = 0x68;
+/// Word of FPSCR in a frame with the FPU's registers; the one behind it is reserved and keeps what is there.
+const FPSCR_WORD: usize = 0x60 / 4;
+/// Words in use of a frame without the FPU's registers, and with them.
+const BASIC_WORDS: usize = BASIC_FRAME as usize / 4;
+const FP_WORDS: usize = FPSCR_WORD + 1;
 /// CONTROL.FPCA: the code has used the FPU.
 const FP_ACTIVE: u64 = 4;
 /// CONTROL.SPSEL: the process stack.
@@ -58,6 +63,29 @@ pub(crate) fn inside_it_block(uc: &Uc<'_>) -> Result<bool, BoardError> {
     Ok(uc.reg_read(R::XPSR)? & 0x0600_fc00 != 0)
 }
 
+/// Reads the words of a frame at once, which the simulator does in the time of one word.
+fn read_words(uc: &Uc<'_>, address: u32, words: &mut [u32]) -> Result<(), BoardError> {
+    let mut bytes = [0; 4 * FP_WORDS];
+    let bytes = &mut bytes[..4 * words.len()];
+    uc.mem_read(u64::from(address), bytes)
+        .map_err(|_| BoardError::Simulator(format!("no memory at {address:#010x} for the stack")))?;
+    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks().0) {
+        *word = u32::from_le_bytes(*bytes);
+    }
+    Ok(())
+}
+
+/// Writes the words of a frame at once.
+fn write_words(uc: &mut Uc<'_>, address: u32, words: &[u32]) -> Result<(), BoardError> {
+    let mut bytes = [0; 4 * FP_WORDS];
+    let bytes = &mut bytes[..4 * words.len()];
+    for (bytes, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
+        *bytes = word.to_le_bytes();
+    }
+    uc.mem_write(u64::from(address), bytes)
+        .map_err(|_| BoardError::Simulator(format!("no memory at {address:#010x} for the stack")))
+}
+
 /// Takes `exception`: stacks the frame, goes to the handler.
 pub(crate) fn enter(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<(), BoardError> {
     let control = uc.reg_read(R::CONTROL)?;
@@ -82,21 +110,21 @@ pub(crate) fn enter(uc: &mut Uc<'_>, exception: u16, priority: i16) -> Result<()
         uc.get_data_mut().fault(what, link);
         return Ok(());
     }
-    let mut words = [0; FP_FRAME as usize / 4];
+    let mut words = [0; FP_WORDS];
     for (word, register) in words.iter_mut().zip(CORE) {
         let value = uc.reg_read(register)? as u32;
         *word = if register == R::PC { value & !1 } else { value };
     }
     words[7] = xpsr & !0x200 | aligned_up << 9 | 1 << 24;
     if fp {
-        for (word, register) in words[8..].iter_mut().zip(FP) {
+        for (word, register) in words[BASIC_WORDS..].iter_mut().zip(FP) {
             *word = uc.reg_read(register)? as u32;
         }
-        words[24] = uc.reg_read(R::FPSCR)? as u32;
-        write_words(uc, frame, &words[..25])?;
+        words[FPSCR_WORD] = uc.reg_read(R::FPSCR)? as u32;
+        write_words(uc, frame, &words)?;
         uc.reg_write(R::CONTROL, control & !FP_ACTIVE)?;
     } else {
-        write_words(uc, frame, &words[..8])?;
+        write_words(uc, frame, &words[..BASIC_WORDS])?;
     }
     uc.reg_write(R::SP, u64::from(frame))?;
     uc.reg_write(R::LR, u64::from(exc_return))?;
@@ -188,16 +216,16 @@ pub(crate) fn leave(uc: &mut Uc<'_>) -> Result<(), BoardError> {
     let outer = machine.scs.stack.last().map_or(0, |active| u32::from(active.exception));
     let fp = exc_return & 0x10 == 0;
     let frame = uc.reg_read(R::SP)? as u32;
-    let mut words = [0; FP_FRAME as usize / 4];
-    read_words(uc, frame, &mut words[..if fp { 25 } else { 8 }])?;
+    let mut words = [0; FP_WORDS];
+    read_words(uc, frame, &mut words[..if fp { FP_WORDS } else { BASIC_WORDS }])?;
     for (word, register) in words.iter().zip(CORE).take(6) {
         uc.reg_write(register, u64::from(*word))?;
     }
     if fp {
-        for (word, register) in words[8..].iter().zip(FP) {
+        for (word, register) in words[BASIC_WORDS..].iter().zip(FP) {
             uc.reg_write(register, u64::from(*word))?;
         }
-        uc.reg_write(R::FPSCR, u64::from(words[24]))?;
+        uc.reg_write(R::FPSCR, u64::from(words[FPSCR_WORD]))?;
     }
     uc.reg_write(R::CONTROL, if fp { control | FP_ACTIVE } else { control })?;
     let (pc, xpsr) = (words[6], words[7]);

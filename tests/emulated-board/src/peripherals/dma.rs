@@ -238,6 +238,22 @@ mod tests {
         assert_eq!((dma.read(0, 0x20), dma.beat(1).to), (Ok(4), 0x2000_0100));
     }
 
+    /// The flag of the error raises the line; neither outlives a reset of the controller.
+    #[test]
+    fn an_error_and_a_reset_leave_nothing_waiting() {
+        let mut dma = reading(0);
+        assert_eq!((dma.waiting(), dma.lines()), (1 << 1, 0));
+        dma.fail(1);
+        assert_eq!((dma.waiting(), dma.lines()), (0, 1 << 12));
+        dma.reset(0);
+        assert_eq!((dma.waiting(), dma.lines()), (0, 0));
+        let mut dma = reading(0);
+        dma.reset(1);
+        assert_eq!(dma.waiting(), 1 << 1, "the other controller");
+        dma.reset(0);
+        assert_eq!(dma.waiting(), 0);
+    }
+
     #[test]
     fn registers_of_an_enabled_channel_and_unequal_sizes_are_refused() {
         let mut dma = reading(0);
