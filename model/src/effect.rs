@@ -421,6 +421,11 @@ pub trait Effect: Sync {
         let _ = (parameters, state, port);
     }
 
+    /// Whether [`Self::transmission`] does the same at every step of a run: such effects are asked once.
+    fn is_constant(&self) -> bool {
+        false
+    }
+
     /// Changes tendons and sheaths.
     fn transmission(
         &self,

@@ -27,11 +27,26 @@ impl core::error::Error for TooManyEffects {}
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EffectSet {
     active: [Option<ActiveEffect>; MAX_ACTIVE],
-    /// Component of each: every step asks for it many times, and its descriptor is behind a call.
-    components: [Option<Component>; MAX_ACTIVE],
     count: usize,
-    /// Whether there is any of each component.
-    touched: [bool; Component::ALL.len()],
+    /// Effects of each component: every step asks for them many times, and their descriptors are behind a call.
+    of_component: [Places; Component::ALL.len()],
+}
+
+/// Places of the effects of one component in the set, in ascending order.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Places {
+    among_all: [u8; MAX_ACTIVE],
+    count: usize,
+    /// Whether any of them changes from step to step what it says of the transmission.
+    vary: bool,
+}
+
+impl Places {
+    const NONE: Self = Self { among_all: [0; MAX_ACTIVE], count: 0, vary: false };
+
+    fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.among_all.iter().take(self.count).map(|place| usize::from(*place))
+    }
 }
 
 /// State of every effect of an [`EffectSet`], in its order.
@@ -42,12 +57,8 @@ pub const FRESH_STATES: EffectStates = [[0.0; MAX_STATE]; MAX_ACTIVE];
 
 impl EffectSet {
     /// No effects.
-    pub const EMPTY: Self = Self {
-        active: [None; MAX_ACTIVE],
-        components: [None; MAX_ACTIVE],
-        count: 0,
-        touched: [false; Component::ALL.len()],
-    };
+    pub const EMPTY: Self =
+        Self { active: [None; MAX_ACTIVE], count: 0, of_component: [Places::NONE; Component::ALL.len()] };
 
     /// Adds an effect.
     ///
@@ -56,9 +67,10 @@ impl EffectSet {
     pub fn push(&mut self, effect: ActiveEffect) -> Result<(), TooManyEffects> {
         let slot = self.active.get_mut(self.count).ok_or(TooManyEffects)?;
         *slot = Some(effect);
-        let component = effect.descriptor().component;
-        self.components[self.count] = Some(component);
-        self.touched[component as usize] = true;
+        let component = &mut self.of_component[effect.descriptor().component as usize];
+        component.among_all[component.count] = self.count as u8;
+        component.count += 1;
+        component.vary |= !effect.effect.is_constant();
         self.count += 1;
         Ok(())
     }
@@ -83,7 +95,20 @@ impl EffectSet {
     /// Whether any effect belongs to `component`.
     #[must_use]
     pub const fn touches(&self, component: Component) -> bool {
-        self.touched[component as usize]
+        self.of_component[component as usize].count > 0
+    }
+
+    /// Whether no effect changes from step to step what it says of the transmission.
+    pub(crate) const fn leave_the_transmission_constant(&self) -> bool {
+        !self.of_component[Component::Transmission as usize].vary
+    }
+
+    /// The effects on the sensors of `channel`, in the order in which they act.
+    pub fn on(&self, channel: Channel) -> impl Iterator<Item = &ActiveEffect> {
+        let sensors = self.of_component[Component::Sensors as usize].iter();
+        sensors
+            .filter_map(|place| self.active[place].as_ref())
+            .filter(move |active| active.target.includes(channel))
     }
 
     /// Law of sheath friction with these effects, for a rig that says `nominal`; the last effect that has one decides.
@@ -104,13 +129,8 @@ impl EffectSet {
         states: &mut EffectStates,
         mut hook: impl FnMut(&'static dyn Effect, &ActiveEffect, &[f64; MAX_PARAMETERS], &mut EffectState),
     ) {
-        if !self.touches(component) {
-            return;
-        }
-        for (index, state) in states.iter_mut().enumerate().take(self.count) {
-            if self.components[index] == Some(component)
-                && let Some(active) = &self.active[index]
-            {
+        for place in self.of_component[component as usize].iter() {
+            if let (Some(active), Some(state)) = (&self.active[place], states.get_mut(place)) {
                 hook(active.effect, active, &active.parameters, state);
             }
         }

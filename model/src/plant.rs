@@ -186,15 +186,15 @@ impl Plant {
     /// True value of a channel of the joint; `None` for what comes from outside it (reference, duty, supply, enable).
     #[must_use]
     pub fn channel(&self, config: &PlantConfig, channel: Channel) -> Option<f64> {
-        let [f1, f2, f3, f4] = self.end_tensions_n(config);
+        let tension_n = |index: usize| Some(self.end_tensions_n(config)[index]);
         match channel {
             Channel::ThetaMotor => Some(self.motor.theta_rad),
             Channel::ThetaIn => Some(self.spindle.theta_rad),
             Channel::ThetaOut => Some(self.joint.theta_rad),
-            Channel::F1 => Some(f1),
-            Channel::F2 => Some(f2),
-            Channel::F3 => Some(f3),
-            Channel::F4 => Some(f4),
+            Channel::F1 => tension_n(0),
+            Channel::F2 => tension_n(1),
+            Channel::F3 => tension_n(2),
+            Channel::F4 => tension_n(3),
             Channel::TorqueIn => Some(self.driving_torque_nm(config)),
             Channel::TorqueOut => Some(self.torque_out_nm(config)),
             Channel::MotorCurrent => Some(self.motor.current_a),

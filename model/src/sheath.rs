@@ -229,7 +229,9 @@ impl SlipLimits {
                 self.ratio[..n].fill(ratio);
                 self.inverse_ratio[..n].fill(1.0 / ratio);
             }
-            self.offset_share[..n].fill(offset);
+            if offset_n != 0.0 || self.offset_n != 0.0 {
+                self.offset_share[..n].fill(offset);
+            }
         } else {
             for (i, wrap_share) in mesh.wrap_share[..n].iter().enumerate() {
                 if wrap_friction != self.wrap_friction {

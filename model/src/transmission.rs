@@ -225,7 +225,10 @@ impl Transmission {
         states: &mut EffectStates,
         motion: PulleyMotion,
     ) {
-        if !effects.touches(Component::Transmission) {
+        let is_first_step = self.wound_excess_rad.is_none();
+        if !effects.touches(Component::Transmission)
+            || (effects.leave_the_transmission_constant() && !is_first_step)
+        {
             return;
         }
         let mut port = TransmissionPort {

@@ -31,6 +31,10 @@ impl Effect for BendingFriction {
         Some("the same slow triangle at three pretensions")
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for law in port.tendons.iter_mut().flat_map(|tendon| &mut tendon.slip) {
             law.friction_n_per_rad += p[0];

@@ -22,6 +22,10 @@ impl Effect for DistributedFriction {
         &DESCRIPTOR
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn friction_law(&self) -> Option<FrictionLaw> {
         Some(FrictionLaw::Distributed)
     }

@@ -35,6 +35,10 @@ impl Effect for PreslidingCompliance {
         Some(Ordinary { unit: OrdinaryUnit::OfSheath, usual: 1e-5, largest: 4e-5 })
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for tendon in &mut port.tendons {
             tendon.presliding_m = p[0];

@@ -25,6 +25,10 @@ impl Effect for StraightEnds {
         &DESCRIPTOR
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn on_request(&self) -> bool {
         true
     }

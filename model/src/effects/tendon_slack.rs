@@ -32,6 +32,10 @@ impl Effect for TendonSlack {
         &DESCRIPTOR
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         for tendon in &mut port.tendons {
             tendon.unilateral = true;

@@ -31,6 +31,10 @@ impl Effect for TransmissionBacklash {
         Some("slow small triangles about the hanging position, where the torque changes sign")
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         port.play_rad += p[0];
     }

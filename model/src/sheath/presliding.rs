@@ -28,8 +28,8 @@ const LARGEST_RETURN: f64 = 0.5;
 /// them do, and a tendon whose contacts all slip moves on at the cost of its ends.
 const SLIPS: f64 = 1e-5;
 
-/// Segments of a tendon of eight and of sixteen contacts: their passes need little room.
-const SMALL: [usize; 2] = [9, 17];
+/// Segments of a tendon of four contacts, as a search simulates most, of eight and of sixteen: their passes need little room.
+const SMALL: [usize; 3] = [5, 9, 17];
 
 /// How one end of a tendon moves.
 #[derive(Clone, Copy, Debug)]
@@ -170,17 +170,25 @@ struct Climbed<const SEGMENTS: usize> {
 /// Moves the same end of one or two tendons along their ladders.
 fn climb(moved: &mut [(&mut Tendon, Pull<'_>)], mesh: &TendonMesh, end: End) {
     match mesh.elements {
-        n if n < SMALL[0] => climb_within::<{ SMALL[0] }>(moved, mesh, end),
-        n if n < SMALL[1] => climb_within::<{ SMALL[1] }>(moved, mesh, end),
-        _ => climb_within::<{ MAX_ELEMENTS + 1 }>(moved, mesh, end),
+        n if n + 1 == SMALL[0] => climb_within::<{ SMALL[0] }, true>(moved, mesh, end),
+        n if n + 1 == SMALL[1] => climb_within::<{ SMALL[1] }, true>(moved, mesh, end),
+        n if n + 1 == SMALL[2] => climb_within::<{ SMALL[2] }, true>(moved, mesh, end),
+        n if n < SMALL[1] => climb_within::<{ SMALL[1] }, false>(moved, mesh, end),
+        n if n < SMALL[2] => climb_within::<{ SMALL[2] }, false>(moved, mesh, end),
+        _ => climb_within::<{ MAX_ELEMENTS + 1 }, false>(moved, mesh, end),
     }
 }
 
-/// The same for ladders of at most `SEGMENTS` segments, with no more room than they need.
+/// The same for ladders of at most `SEGMENTS` segments, with no more room than they need; where `ALL` of them are there, the passes are
+/// compiled without counting.
 #[inline(never)]
-fn climb_within<const SEGMENTS: usize>(moved: &mut [(&mut Tendon, Pull<'_>)], mesh: &TendonMesh, end: End) {
+fn climb_within<const SEGMENTS: usize, const ALL: bool>(
+    moved: &mut [(&mut Tendon, Pull<'_>)],
+    mesh: &TendonMesh,
+    end: End,
+) {
     let (Some((a, pull_a)), Some((b, pull_b))) = (moved.first(), moved.last()) else { return };
-    let climbed = passes::<SEGMENTS>([a, b], mesh, end, [pull_a, pull_b]);
+    let climbed = passes::<SEGMENTS, ALL>([a, b], mesh, end, [pull_a, pull_b]);
     for (lane, (tendon, pull)) in moved.iter_mut().enumerate() {
         tendon.take_over(mesh, end, pull, (&climbed, lane));
         tendon.take_in_far_end(mesh, end, pull);
@@ -188,13 +196,13 @@ fn climb_within<const SEGMENTS: usize>(moved: &mut [(&mut Tendon, Pull<'_>)], me
 }
 
 /// The passes along two ladders, side by side.
-fn passes<const SEGMENTS: usize>(
+fn passes<const SEGMENTS: usize, const ALL: bool>(
     tendons: [&Tendon; 2],
     mesh: &TendonMesh,
     end: End,
     pulls: [&Pull<'_>; 2],
 ) -> Climbed<SEGMENTS> {
-    let n = mesh.elements.min(SEGMENTS - 1);
+    let n = if ALL { SEGMENTS - 1 } else { mesh.elements.min(SEGMENTS - 1) };
     let from_output = end == End::Output;
     let segment = |j: usize| if from_output { n - j } else { j };
     let contact = |i: usize| if from_output { n - 1 - i } else { i };

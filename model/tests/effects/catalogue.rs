@@ -269,6 +269,35 @@ fn only_the_hooks_of_active_effects_run() {
     assert_eq!(watched, observed(&lively_run(&[])));
 }
 
+/// An effect on the transmission that does nothing, and does not say so.
+struct Idle;
+
+static IDLE_ONE: Descriptor = described("idle", Component::Transmission);
+
+impl Effect for Idle {
+    fn descriptor(&self) -> &'static Descriptor {
+        &IDLE_ONE
+    }
+}
+
+/// What calls itself constant is asked once a run; beside an effect that does not, it is asked at every step, and the run is bit for bit the same.
+#[test]
+fn constant_effects_say_the_same_at_every_step() {
+    let constant: Vec<_> = CATALOGUE.into_iter().filter(|effect| effect.is_constant()).collect();
+    assert_eq!(constant.len(), 6);
+    for effect in constant {
+        let mut active = ActiveEffect::with_defaults(effect);
+        for (value, spec) in active.parameters.iter_mut().zip(effect.descriptor().parameters) {
+            if *value == 0.0 {
+                *value = 0.1 * spec.upper;
+            }
+        }
+        let asked_once = observed(&lively_run(&[active]));
+        let always_asked = observed(&lively_run(&[active, ActiveEffect::with_defaults(&Idle)]));
+        assert_eq!(asked_once, always_asked, "{}", effect.descriptor().id);
+    }
+}
+
 #[test]
 fn a_full_set_refuses_one_more() {
     let effect = ActiveEffect::with_defaults(find("joint_spring").unwrap());

@@ -45,7 +45,8 @@ impl Run<'_> {
         if self.model.guided_by.is_some() || matches!(self.drive, Drive::Duty | Drive::Servo) {
             plant.set_speed_rad_s(input.start_rad_s);
         }
-        plant.settle(self.config, &self.step_input(0, start_rad));
+        let recorded = Recorded::of(self);
+        plant.settle(self.config, &recorded.step_input(0, start_rad));
         let mut sampler = Sampler::new(outputs, effects);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
@@ -60,7 +61,7 @@ impl Run<'_> {
             if k > 0 {
                 let from_rad = wanted_rad;
                 wanted_rad = theta_in_rad(k, span_s);
-                let steps = (span_s / longest_s - 1e-9).ceil().max(1.0);
+                let steps = steps_in(span_s / longest_s);
                 let dt_s = span_s / steps;
                 for sub in 1..=steps as usize {
                     // Where the recording stands after a part of the steps between two samples.
@@ -69,7 +70,7 @@ impl Run<'_> {
                         from_rad.zip(wanted_rad).map_or(0.0, |(from, to)| from + (to - from) * share)
                     };
                     // An angle that is prescribed is the one at the end of the step.
-                    let mut step = self.step_input(k - 1, recorded_rad(sub));
+                    let mut step = recorded.step_input(k - 1, recorded_rad(sub));
                     match self.drive {
                         Drive::GuidedMotor => {
                             let band = input
@@ -121,22 +122,55 @@ impl Run<'_> {
     fn ratio(&self) -> f64 {
         self.model.parameters.pulleys.map_or(1.0, |p| p.input_radius_m / p.output_radius_m)
     }
+}
 
+/// What a recording says of the inputs of a step, found once for all steps.
+struct Recorded<'a> {
+    duty: Option<&'a [f64]>,
+    bus_v: Option<&'a [f64]>,
+    enabled: Option<&'a [f64]>,
+    torque_out_nm: Option<&'a [f64]>,
+    /// Supply of the rig, V, where none is recorded.
+    supply_v: f64,
+}
+
+impl<'a> Recorded<'a> {
+    fn of(run: &Run<'a>) -> Self {
+        let values = |of: &'a Option<Arc<Vec<f64>>>| of.as_ref().map(|values| values.as_slice());
+        let input = run.input;
+        Self {
+            duty: values(&input.duty),
+            bus_v: values(&input.bus_v),
+            enabled: values(&input.enabled),
+            torque_out_nm: values(&input.torque_out_nm),
+            supply_v: run.model.parameters.motor.map_or(0.0, |motor| motor.supply_v),
+        }
+    }
+
+    /// Input of a step after sample `k`.
+    #[inline]
     fn step_input(&self, k: usize, theta_in_rad: f64) -> StepInput {
-        let input = self.input;
-        let at = |values: &Option<Arc<Vec<f64>>>, otherwise: f64| values.as_ref().map_or(otherwise, |v| v[k]);
+        let at = |values: Option<&[f64]>, otherwise: f64| values.map_or(otherwise, |v| v[k]);
         StepInput {
             bridge: BridgeInput {
-                duty: at(&input.duty, 0.0),
-                bus_v: at(&input.bus_v, self.model.parameters.motor.map_or(0.0, |m| m.supply_v)),
-                enabled: at(&input.enabled, 1.0) > 0.5,
+                duty: at(self.duty, 0.0),
+                bus_v: at(self.bus_v, self.supply_v),
+                enabled: at(self.enabled, 1.0) > 0.5,
             },
             theta_in_rad,
             theta_out_rad: 0.0,
             input_torque_nm: 0.0,
             loose_pulley: Outside::NOTHING,
             // The recorded torque is that of the cables on the joint; the load answers with its negative.
-            external_torque_nm: -at(&input.torque_out_nm, 0.0),
+            external_torque_nm: -at(self.torque_out_nm, 0.0),
         }
     }
+}
+
+/// Steps between two samples that lie `longest` of the longest steps apart.
+#[inline]
+fn steps_in(longest: f64) -> f64 {
+    let whole = longest - 1e-9;
+    // Rounding up is a call.
+    if whole > 1.0 { whole.ceil() } else { 1.0 }
 }

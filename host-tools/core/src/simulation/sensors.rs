@@ -1,22 +1,30 @@
 //! Sensors of a replay: channels as they would show without noise and steps.
 
 use bowden_model::channel::Channel;
-use bowden_model::effect::SensorPort;
+use bowden_model::effect::{ActiveEffect, EffectState, SensorPort};
 use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
 use bowden_model::plant::{Plant, PlantConfig};
 
 /// What the sensors would have shown had they no noise and no steps.
 pub(super) struct Sampler<'a> {
-    effects: &'a EffectSet,
-    outputs: &'a [Channel],
-    states: Vec<EffectStates>,
+    sensors: Vec<Sensor<'a>>,
     values: Vec<f64>,
 }
 
+/// What measures one channel.
+struct Sensor<'a> {
+    channel: Channel,
+    /// Effects that act on it, in their order, with their states.
+    effects: Vec<(&'a ActiveEffect, EffectState)>,
+}
+
 impl<'a> Sampler<'a> {
-    pub fn new(outputs: &'a [Channel], effects: &'a EffectSet) -> Self {
-        let states = vec![FRESH_STATES; outputs.len()];
-        Self { effects, outputs, states, values: vec![0.0; outputs.len()] }
+    pub fn new(outputs: &[Channel], effects: &'a EffectSet) -> Self {
+        let sensor = |channel: &Channel| {
+            let fresh = |effect| (effect, EffectState::default());
+            Sensor { channel: *channel, effects: effects.on(*channel).map(fresh).collect() }
+        };
+        Self { sensors: outputs.iter().map(sensor).collect(), values: vec![0.0; outputs.len()] }
     }
 
     pub fn sample(
@@ -26,11 +34,13 @@ impl<'a> Sampler<'a> {
         duty: f64,
         (t_s, dt_s): (f64, f64),
     ) -> &[f64] {
-        for ((channel, value), states) in self.outputs.iter().zip(&mut self.values).zip(&mut self.states) {
+        for (Sensor { channel, effects }, value) in self.sensors.iter_mut().zip(&mut self.values) {
             let outside = if *channel == Channel::Duty { duty } else { 0.0 };
             let mut port =
                 SensorPort { t_s, dt_s, value: plant.channel(config, *channel).unwrap_or(outside) };
-            self.effects.measure(*channel, states, &mut port);
+            for (active, state) in effects {
+                active.effect.measure(&active.parameters, state, &mut port);
+            }
             *value = port.value;
         }
         &self.values
