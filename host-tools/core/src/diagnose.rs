@@ -508,8 +508,15 @@ impl Case<'_> {
                 (series.name().to_owned(), fit)
             })
             .collect();
-        let summary =
+        let mut summary =
             words::summary(verdict, &effects, &recalibrated_parameters, !laws.is_empty(), &heldout_loss);
+        for (series, _) in judge.scales() {
+            summary.extend(words::worse_free_run(
+                series.name(),
+                place::unit_of(*series),
+                &channels[series.name()],
+            ));
+        }
         let coarse = at_search_resolution(&last.model, model);
         let mut indistinguishable =
             crate::fit::identifiability::indistinguishable(objective, &coarse).unwrap_or_default();

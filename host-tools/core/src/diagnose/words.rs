@@ -7,7 +7,7 @@ use bowden_model::law;
 
 use super::policy::POLICY;
 use super::selection::{Chosen, Tried};
-use super::verdict::{NamedEffect, Recalibrated, Rival, StageLoss, Verdict};
+use super::verdict::{ChannelFit, NamedEffect, Recalibrated, Rival, StageLoss, Verdict};
 use crate::fit::calibrated::wrong_from;
 
 /// What a summary says after Ctrl-C.
@@ -205,10 +205,42 @@ pub(super) fn summary(
     }
 }
 
+/// What a summary adds on a channel that a free run of the diagnosed rig predicts worse than one of the recalibrated rig does.
+pub(super) fn worse_free_run(channel: &str, unit: &str, fit: &ChannelFit) -> Option<String> {
+    let [recalibrated, after] = [fit.recalibrated_rmse, fit.after_rmse].map(|rmse| quantity(rmse, unit));
+    (fit.free_run && fit.after_rmse > fit.recalibrated_rmse).then(|| {
+        format!(
+            " In a free run it predicts {channel} worse than the recalibrated rig does: {after} off instead of {recalibrated}. Compare \
+             both before you simulate with it."
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{listed, short, summary};
-    use crate::diagnose::verdict::{Recalibrated, StageLoss, Verdict};
+    use super::{listed, short, summary, worse_free_run};
+    use crate::diagnose::verdict::{ChannelFit, Recalibrated, StageLoss, Verdict};
+
+    /// A joint that was held to its angle, and turns over once more than it should when nothing holds it.
+    #[test]
+    fn a_free_run_that_got_worse_is_said_to_be() {
+        let said = |after_rmse: f64, free_run: bool| {
+            let fit = ChannelFit {
+                before_rmse: 69.3,
+                recalibrated_rmse: 1.004,
+                after_rmse,
+                noise_rmse: 0.001,
+                free_run,
+            };
+            worse_free_run("theta_out_rad", "rad", &fit)
+        };
+        assert_eq!(
+            said(36.0, true).unwrap(),
+            " In a free run it predicts theta_out_rad worse than the recalibrated rig does: 36.0 rad off instead of 1.00 rad. Compare both \
+             before you simulate with it."
+        );
+        assert_eq!((said(0.01, true), said(1.004, true), said(36.0, false)), (None, None, None));
+    }
 
     /// A joint whose rig file has no mass, and whose arm turns out to be a tenth longer.
     #[test]
