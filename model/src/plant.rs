@@ -185,6 +185,7 @@ impl Plant {
 
     /// True value of a channel of the joint; `None` for what comes from outside it (reference, duty, supply, enable).
     #[must_use]
+    #[inline]
     pub fn channel(&self, config: &PlantConfig, channel: Channel) -> Option<f64> {
         let tension_n = |index: usize| Some(self.end_tensions_n(config)[index]);
         match channel {

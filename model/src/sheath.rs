@@ -261,6 +261,21 @@ struct FullSlip {
     compliance_m_per_n: f64,
     /// Output tension per input tension, slope.
     ratio: f64,
+    /// Slope of the tension of each end over a move of it, N/m.
+    stiffness_n_per_m: [f64; 2],
+}
+
+impl FullSlip {
+    fn new(towards_input: bool, limits: &SlipLimits, [compliance_m_per_n, ratio]: [f64; 2]) -> Self {
+        Self {
+            towards_input,
+            wrap_friction: limits.wrap_friction,
+            offset_n: limits.offset_n,
+            compliance_m_per_n,
+            ratio,
+            stiffness_n_per_m: [1.0 / compliance_m_per_n, ratio / compliance_m_per_n],
+        }
+    }
 }
 
 /// Tension profile of one tendon: state only.
@@ -395,10 +410,7 @@ impl Tendon {
         if input_n <= 0.0 || output_n <= 0.0 {
             return false;
         }
-        self.stiffness_n_per_m[end as usize] = match end {
-            End::Input => 1.0 / full.compliance_m_per_n,
-            End::Output => full.ratio / full.compliance_m_per_n,
-        };
+        self.stiffness_n_per_m[end as usize] = full.stiffness_n_per_m[end as usize];
         self.front[end as usize] = mesh.elements;
         self.tension_n[0] = input_n;
         self.tension_n[mesh.elements] = output_n;
@@ -406,9 +418,16 @@ impl Tendon {
         true
     }
 
-    /// Writes the inner profile of a tendon in full slip.
+    /// Writes the inner profile of a tendon in full slip, where it is stale.
+    #[inline]
     fn fill_in(&mut self, mesh: &TendonMesh) {
-        let Some(full) = self.full_slip.filter(|_| self.inner_is_stale) else { return };
+        if self.inner_is_stale {
+            self.fill_in_stale(mesh);
+        }
+    }
+
+    fn fill_in_stale(&mut self, mesh: &TendonMesh) {
+        let Some(full) = self.full_slip else { return };
         let sign = if full.towards_input { -1.0 } else { 1.0 };
         let even_step = exp(sign * full.wrap_friction / mesh.elements as f64);
         let mut tension = self.tension_n[0];
@@ -494,13 +513,8 @@ impl Tendon {
             self.slack_m[end] += h - elongation_m;
             tension = 0.0;
         } else if front == n && self.slack_m == [0.0; 2] {
-            self.full_slip = Some(FullSlip {
-                towards_input: pulled != FROM_OUTPUT,
-                wrap_friction: limits.wrap_friction,
-                offset_n: limits.offset_n,
-                compliance_m_per_n: if FROM_OUTPUT { s / p } else { s },
-                ratio: if FROM_OUTPUT { 1.0 / p } else { p },
-            });
+            let from_input = if FROM_OUTPUT { [s / p, 1.0 / p] } else { [s, p] };
+            self.full_slip = Some(FullSlip::new(pulled != FROM_OUTPUT, limits, from_input));
             self.inner_is_stale = false;
         }
         self.tension_n[segment(0)] = tension;

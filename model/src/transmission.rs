@@ -302,8 +302,11 @@ impl Transmission {
     }
 
     /// Lets the tendons move inside a play of the input pulley, once both pulleys have turned.
+    #[inline]
     pub(crate) fn close_play(&mut self, config: &TransmissionConfig) {
-        self.play = self.relax_play(config, End::Input, Outside::NOTHING, self.play, self.play_rad);
+        if self.play.is_there(self.play_rad) {
+            self.play = self.relax_play(config, End::Input, Outside::NOTHING, self.play, self.play_rad);
+        }
     }
 
     /// Whether the tendons are inside a play of the input pulley, where neither drives the other.

@@ -287,7 +287,7 @@ impl Case<'_> {
             last.model.effects.extend(hums.iter().map(|(hum, _)| hum.law));
             stages.after = Stage::of(judge, &last.model)?;
             stages.recalibrated = if selected.chosen.is_empty() {
-                Stage::of(judge, &last.model)?
+                stages.after.clone()
             } else {
                 let baseline = at_full_resolution(&selected.baseline.model, model);
                 Stage::of(judge, &freely(&baseline, &selected.baseline)?.model)?

@@ -3,8 +3,6 @@
 mod quantum;
 mod smoother;
 
-use std::collections::VecDeque;
-
 pub use quantum::quantum_of;
 pub use smoother::{Motion, smooth};
 
@@ -12,21 +10,19 @@ pub use smoother::{Motion, smooth};
 #[must_use]
 pub fn moving_average(mut values: Vec<f64>, half: usize) -> Vec<f64> {
     let n = values.len();
-    // Sums of all samples before those from `first` on, as far as they are still needed.
-    let mut sums = VecDeque::with_capacity(2 * half + 2);
-    sums.push_back(0.0);
-    let (mut first, mut sum) = (0, 0.0);
+    let half = half.min(n);
+    // Sums of the samples before each, as far as they are still needed: in a ring whose length is a power of two.
+    let mut sums = vec![0.0; (2 * half + 2).next_power_of_two()];
+    let last = sums.len() - 1;
+    let (mut summed, mut sum) = (0, 0.0);
     for k in 0..n {
         let (from, to) = (k.saturating_sub(half), (k + half + 1).min(n));
-        while first + sums.len() <= to {
-            sum += values[first + sums.len() - 1];
-            sums.push_back(sum);
+        while summed < to {
+            sum += values[summed];
+            summed += 1;
+            sums[summed & last] = sum;
         }
-        while first < from {
-            sums.pop_front();
-            first += 1;
-        }
-        values[k] = (sums[to - first] - sums[0]) / (to - from) as f64;
+        values[k] = (sums[to & last] - sums[from & last]) / (to - from) as f64;
     }
     values
 }

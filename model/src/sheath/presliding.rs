@@ -122,10 +122,14 @@ impl Tendon {
     }
 
     /// Lets a far end that hangs loose slide in until it is tight or carries nothing.
+    #[inline]
     fn take_in_far_end(&mut self, mesh: &TendonMesh, end: End, pull: &Pull<'_>) {
+        if !pull.unilateral {
+            return;
+        }
         let far = if end == End::Output { End::Input } else { End::Output };
         let loose_m = self.slack_m[far as usize];
-        if pull.unilateral && loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
+        if loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
             self.slack_m[far as usize] = 0.0;
             self.move_end_presliding(mesh, pull.limits, far, -loose_m, true, pull.presliding_m);
         }
@@ -140,13 +144,7 @@ impl Tendon {
             compliance_m_per_n += compliance * ratio;
         }
         let length_m = self.elongation_m(mesh);
-        self.full_slip = Some(FullSlip {
-            towards_input,
-            wrap_friction: limits.wrap_friction,
-            offset_n: limits.offset_n,
-            compliance_m_per_n,
-            ratio,
-        });
+        self.full_slip = Some(FullSlip::new(towards_input, limits, [compliance_m_per_n, ratio]));
         self.inner_is_stale = true;
         self.fill_in(mesh);
         self.tension_n[0] += (length_m - self.elongation_m(mesh)) / compliance_m_per_n;

@@ -15,6 +15,7 @@ const ALL_DRAWN: usize = 100_000;
 const COLUMNS: usize = 5000;
 
 /// One stage.
+#[derive(Clone)]
 pub(crate) struct Stage {
     /// Against all recordings.
     pub residuals: Residuals,
