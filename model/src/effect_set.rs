@@ -30,6 +30,8 @@ pub struct EffectSet {
     count: usize,
     /// Effects of each component: every step asks for them many times, and their descriptors are behind a call.
     of_component: [Places; Component::ALL.len()],
+    /// Whether any effect changes from step to step what it says of the transmission.
+    transmission_varies: bool,
 }
 
 /// Places of the effects of one component in the set, in ascending order.
@@ -37,12 +39,10 @@ pub struct EffectSet {
 struct Places {
     among_all: [u8; MAX_ACTIVE],
     count: usize,
-    /// Whether any of them changes from step to step what it says of the transmission.
-    vary: bool,
 }
 
 impl Places {
-    const NONE: Self = Self { among_all: [0; MAX_ACTIVE], count: 0, vary: false };
+    const NONE: Self = Self { among_all: [0; MAX_ACTIVE], count: 0 };
 
     fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.among_all.iter().take(self.count).map(|place| usize::from(*place))
@@ -57,8 +57,12 @@ pub const FRESH_STATES: EffectStates = [[0.0; MAX_STATE]; MAX_ACTIVE];
 
 impl EffectSet {
     /// No effects.
-    pub const EMPTY: Self =
-        Self { active: [None; MAX_ACTIVE], count: 0, of_component: [Places::NONE; Component::ALL.len()] };
+    pub const EMPTY: Self = Self {
+        active: [None; MAX_ACTIVE],
+        count: 0,
+        of_component: [Places::NONE; Component::ALL.len()],
+        transmission_varies: false,
+    };
 
     /// Adds an effect.
     ///
@@ -67,10 +71,11 @@ impl EffectSet {
     pub fn push(&mut self, effect: ActiveEffect) -> Result<(), TooManyEffects> {
         let slot = self.active.get_mut(self.count).ok_or(TooManyEffects)?;
         *slot = Some(effect);
-        let component = &mut self.of_component[effect.descriptor().component as usize];
-        component.among_all[component.count] = self.count as u8;
-        component.count += 1;
-        component.vary |= !effect.effect.is_constant();
+        let component = effect.descriptor().component;
+        let places = &mut self.of_component[component as usize];
+        places.among_all[places.count] = self.count as u8;
+        places.count += 1;
+        self.transmission_varies |= component == Component::Transmission && !effect.effect.is_constant();
         self.count += 1;
         Ok(())
     }
@@ -98,17 +103,25 @@ impl EffectSet {
         self.of_component[component as usize].count > 0
     }
 
-    /// Whether no effect changes from step to step what it says of the transmission.
-    pub(crate) const fn leave_the_transmission_constant(&self) -> bool {
-        !self.of_component[Component::Transmission as usize].vary
+    /// Whether any effect changes from step to step what it says of the transmission.
+    pub(crate) const fn transmission_varies(&self) -> bool {
+        self.transmission_varies
+    }
+
+    /// The effects of one component and their places in the set, in the order in which they act.
+    fn of(&self, component: Component) -> impl Iterator<Item = (usize, &ActiveEffect)> {
+        let places = self.of_component[component as usize].iter();
+        places.filter_map(|place| Some((place, self.active[place].as_ref()?)))
+    }
+
+    /// The effects on the sensors of `channel` and their places in the set.
+    fn places_on(&self, channel: Channel) -> impl Iterator<Item = (usize, &ActiveEffect)> {
+        self.of(Component::Sensors).filter(move |(_, active)| active.target.includes(channel))
     }
 
     /// The effects on the sensors of `channel`, in the order in which they act.
     pub fn on(&self, channel: Channel) -> impl Iterator<Item = &ActiveEffect> {
-        let sensors = self.of_component[Component::Sensors as usize].iter();
-        sensors
-            .filter_map(|place| self.active[place].as_ref())
-            .filter(move |active| active.target.includes(channel))
+        self.places_on(channel).map(|(_, active)| active)
     }
 
     /// Law of sheath friction with these effects, for a rig that says `nominal`; the last effect that has one decides.
@@ -127,48 +140,42 @@ impl EffectSet {
         &self,
         component: Component,
         states: &mut EffectStates,
-        mut hook: impl FnMut(&'static dyn Effect, &ActiveEffect, &[f64; MAX_PARAMETERS], &mut EffectState),
+        mut hook: impl FnMut(&'static dyn Effect, &[f64; MAX_PARAMETERS], &mut EffectState),
     ) {
-        for place in self.of_component[component as usize].iter() {
-            if let (Some(active), Some(state)) = (&self.active[place], states.get_mut(place)) {
-                hook(active.effect, active, &active.parameters, state);
-            }
+        for (place, active) in self.of(component) {
+            hook(active.effect, &active.parameters, &mut states[place]);
         }
     }
 
     pub(crate) fn drive(&self, states: &mut EffectStates, port: &mut DrivePort) {
-        self.for_each(Component::Motor, states, |effect, _, p, s| effect.drive(p, s, port));
+        self.for_each(Component::Motor, states, |effect, p, s| effect.drive(p, s, port));
     }
 
     pub(crate) fn motor(&self, states: &mut EffectStates, port: &mut MotorPort) {
-        self.for_each(Component::Motor, states, |effect, _, p, s| effect.motor(p, s, port));
+        self.for_each(Component::Motor, states, |effect, p, s| effect.motor(p, s, port));
     }
 
     pub(crate) fn transmission(&self, states: &mut EffectStates, port: &mut TransmissionPort) {
-        self.for_each(Component::Transmission, states, |effect, _, p, s| effect.transmission(p, s, port));
+        self.for_each(Component::Transmission, states, |effect, p, s| effect.transmission(p, s, port));
     }
 
     pub(crate) fn joint(&self, states: &mut EffectStates, port: &mut JointPort) {
-        self.for_each(Component::Joint, states, |effect, _, p, s| effect.joint(p, s, port));
+        self.for_each(Component::Joint, states, |effect, p, s| effect.joint(p, s, port));
     }
 
     /// What the sensors of `channel` show for a true value, before quantisation and noise.
     ///
     /// `states` are the sensors' own: one array a channel, because a filter keeps its memory per channel.
     pub fn measure(&self, channel: Channel, states: &mut EffectStates, port: &mut SensorPort) {
-        self.for_each(Component::Sensors, states, |effect, active, p, s| {
-            if active.target.includes(channel) {
-                effect.measure(p, s, port);
-            }
-        });
+        for (place, active) in self.places_on(channel) {
+            active.effect.measure(&active.parameters, &mut states[place], port);
+        }
     }
 
     /// True value behind what the sensors of `channel` showed, as far as they allow.
     pub fn correct(&self, channel: Channel, states: &mut EffectStates, port: &mut SensorPort) {
-        self.for_each(Component::Sensors, states, |effect, active, p, s| {
-            if active.target.includes(channel) {
-                effect.correct(p, s, port);
-            }
-        });
+        for (place, active) in self.places_on(channel) {
+            active.effect.correct(&active.parameters, &mut states[place], port);
+        }
     }
 }

@@ -229,6 +229,7 @@ impl SlipLimits {
                 self.ratio[..n].fill(ratio);
                 self.inverse_ratio[..n].fill(1.0 / ratio);
             }
+            // Mostly there is none, and was none.
             if offset_n != 0.0 || self.offset_n != 0.0 {
                 self.offset_share[..n].fill(offset);
             }

@@ -226,9 +226,7 @@ impl Transmission {
         motion: PulleyMotion,
     ) {
         let is_first_step = self.wound_excess_rad.is_none();
-        if !effects.touches(Component::Transmission)
-            || (effects.leave_the_transmission_constant() && !is_first_step)
-        {
+        if !effects.touches(Component::Transmission) || (!effects.transmission_varies() && !is_first_step) {
             return;
         }
         let mut port = TransmissionPort {
@@ -304,9 +302,7 @@ impl Transmission {
     /// Lets the tendons move inside a play of the input pulley, once both pulleys have turned.
     #[inline]
     pub(crate) fn close_play(&mut self, config: &TransmissionConfig) {
-        if self.play.is_there(self.play_rad) {
-            self.play = self.relax_play(config, End::Input, Outside::NOTHING, self.play, self.play_rad);
-        }
+        self.play = self.relax_play(config, End::Input, Outside::NOTHING, self.play, self.play_rad);
     }
 
     /// Whether the tendons are inside a play of the input pulley, where neither drives the other.
@@ -323,6 +319,7 @@ impl Transmission {
     /// tendons that stick next to the pulley, the stiffest they can be; they get softer as they slip, so that each step
     /// falls short of the place and none swings across it, which would feed energy into the play. Both pulleys have turned before:
     /// after the turn of one alone the tendons would see the travel of a step, 1.6 mrad at 3 rad/s and 0.5 ms, as a lead.
+    #[inline]
     pub(crate) fn relax_play(
         &mut self,
         config: &TransmissionConfig,
@@ -331,9 +328,18 @@ impl Transmission {
         play: Play,
         width_rad: f64,
     ) -> Play {
-        if !play.is_there(width_rad) {
-            return play;
-        }
+        if play.is_there(width_rad) { self.relax(config, end, outside, play, width_rad) } else { play }
+    }
+
+    /// The same of a play that is there.
+    fn relax(
+        &mut self,
+        config: &TransmissionConfig,
+        end: End,
+        outside: Outside,
+        play: Play,
+        width_rad: f64,
+    ) -> Play {
         let half = 0.5 * width_rad;
         let mut lead_rad = play.lead_rad;
         let mut stiffness = config.sticking_stiffness_nm_per_rad(end);

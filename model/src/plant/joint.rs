@@ -118,9 +118,7 @@ impl Joint {
             self.omega_rad_s = (self.theta_rad - before_rad) / dt_s;
         }
         cables.close_play(parts);
-        if self.play.is_there(port.play_rad) {
-            self.play = cables.relax_play(parts, End::Output, Outside::NOTHING, self.play, port.play_rad);
-        }
+        self.play = cables.relax_play(parts, End::Output, Outside::NOTHING, self.play, port.play_rad);
     }
 
     /// Turns a joint without inertia until the cables balance load and friction: dry friction of `level_nm` that builds up over

@@ -124,12 +124,9 @@ impl Tendon {
     /// Lets a far end that hangs loose slide in until it is tight or carries nothing.
     #[inline]
     fn take_in_far_end(&mut self, mesh: &TendonMesh, end: End, pull: &Pull<'_>) {
-        if !pull.unilateral {
-            return;
-        }
         let far = if end == End::Output { End::Input } else { End::Output };
         let loose_m = self.slack_m[far as usize];
-        if loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
+        if pull.unilateral && loose_m > 0.0 && self.end_tension_n(mesh, far) > 0.0 {
             self.slack_m[far as usize] = 0.0;
             self.move_end_presliding(mesh, pull.limits, far, -loose_m, true, pull.presliding_m);
         }

@@ -33,14 +33,9 @@ impl Run<'_> {
         let effects = self.config.effects();
         let mut states = FRESH_STATES;
         let guiding = self.model.guiding_channel();
-        let is_distorted = effects.on(guiding).next().is_some();
         let mut theta_in_rad = |k: usize, dt_s: f64| {
             let motion = input.motion.as_ref()?;
-            let value = motion.theta_rad[k];
-            if !is_distorted {
-                return Some(value);
-            }
-            let mut port = SensorPort { t_s: input.clock_at_s(k), dt_s, value };
+            let mut port = SensorPort { t_s: input.clock_at_s(k), dt_s, value: motion.theta_rad[k] };
             effects.correct(guiding, &mut states, &mut port);
             Some(port.value)
         };
