@@ -493,7 +493,7 @@ impl Case<'_> {
             loss_recalibrated: training_loss.recalibrated,
         };
         let verdict = decide(&evidence, &POLICY);
-        let channels: BTreeMap<String, ChannelFit> = judge
+        let compared: Vec<(Series, ChannelFit)> = judge
             .scales()
             .iter()
             .enumerate()
@@ -505,18 +505,14 @@ impl Case<'_> {
                     noise_rmse: judge.noise_variance(*series).sqrt(),
                     free_run: model.guided_by.is_some() && *series != Series::Guide,
                 };
-                (series.name().to_owned(), fit)
+                (*series, fit)
             })
             .collect();
-        let mut summary =
-            words::summary(verdict, &effects, &recalibrated_parameters, !laws.is_empty(), &heldout_loss);
-        for (series, _) in judge.scales() {
-            summary.extend(words::worse_free_run(
-                series.name(),
-                place::unit_of(*series),
-                &channels[series.name()],
-            ));
-        }
+        let by_a_law = !laws.is_empty();
+        let summary =
+            words::summary(verdict, &effects, &recalibrated_parameters, by_a_law, &heldout_loss, &compared);
+        let channels: BTreeMap<String, ChannelFit> =
+            compared.into_iter().map(|(series, fit)| (series.name().to_owned(), fit)).collect();
         let coarse = at_search_resolution(&last.model, model);
         let mut indistinguishable =
             crate::fit::identifiability::indistinguishable(objective, &coarse).unwrap_or_default();

@@ -5,10 +5,12 @@ use std::fmt::Write;
 use bowden_model::effect::{ActiveEffect, Component, ParameterSpec};
 use bowden_model::law;
 
+use super::place::unit_of;
 use super::policy::POLICY;
 use super::selection::{Chosen, Tried};
 use super::verdict::{ChannelFit, NamedEffect, Recalibrated, Rival, StageLoss, Verdict};
 use crate::fit::calibrated::wrong_from;
+use crate::fit::objective::Series;
 
 /// What a summary says after Ctrl-C.
 pub(super) const STOPPED: &str = "The search was stopped before every effect had been tried.";
@@ -159,13 +161,14 @@ fn listed(items: &[&str]) -> String {
     }
 }
 
-/// Summary of the diagnosis in two or three sentences.
+/// Summary of the diagnosis in two or three sentences, and one more for each channel of which a free run got worse.
 pub(super) fn summary(
     verdict: Verdict,
     effects: &[NamedEffect],
     recalibrated: &[Recalibrated],
     by_a_law: bool,
     heldout_loss: &StageLoss,
+    compared: &[(Series, ChannelFit)],
 ) -> String {
     let changed: Vec<String> = recalibrated.iter().filter(|p| p.is_wrong()).map(change).collect();
     let parameters = if changed.is_empty() {
@@ -184,7 +187,7 @@ pub(super) fn summary(
     } else {
         " Held-out data do not confirm this: the effect is absent there, or hardly visible."
     };
-    match verdict {
+    let mut said = match verdict {
         Verdict::Consistent => {
             format!(
                 "The simulation agrees with the recordings; nothing needs to be added or changed. {parameters}"
@@ -202,15 +205,19 @@ pub(super) fn summary(
         Verdict::Unexplained => {
             format!("The recordings contain structure that no effect of the catalogue explains. {parameters}")
         }
-    }
+    };
+    said.extend(compared.iter().filter_map(|(series, fit)| worse_free_run(*series, fit)));
+    said
 }
 
 /// What a summary adds on a channel that a free run of the diagnosed rig predicts worse than one of the recalibrated rig does.
-pub(super) fn worse_free_run(channel: &str, unit: &str, fit: &ChannelFit) -> Option<String> {
-    let [recalibrated, after] = [fit.recalibrated_rmse, fit.after_rmse].map(|rmse| quantity(rmse, unit));
+fn worse_free_run(series: Series, fit: &ChannelFit) -> Option<String> {
     (fit.free_run && fit.after_rmse > fit.recalibrated_rmse).then(|| {
+        let shown = |rmse: f64| quantity(rmse, unit_of(series));
+        let (channel, recalibrated, after) =
+            (series.name(), shown(fit.recalibrated_rmse), shown(fit.after_rmse));
         format!(
-            " In a free run it predicts {channel} worse than the recalibrated rig does: {after} off instead of {recalibrated}. Compare \
+            " In a free run the diagnosed rig predicts {channel} worse than the recalibrated rig does: {after} off instead of {recalibrated}. Compare \
              both before you simulate with it."
         )
     })
@@ -218,8 +225,10 @@ pub(super) fn worse_free_run(channel: &str, unit: &str, fit: &ChannelFit) -> Opt
 
 #[cfg(test)]
 mod tests {
-    use super::{listed, short, summary, worse_free_run};
+    use super::{listed, short, summary};
     use crate::diagnose::verdict::{ChannelFit, Recalibrated, StageLoss, Verdict};
+    use crate::fit::objective::Series;
+    use bowden_model::channel::Channel;
 
     /// A joint that was held to its angle, and turns over once more than it should when nothing holds it.
     #[test]
@@ -232,14 +241,17 @@ mod tests {
                 noise_rmse: 0.001,
                 free_run,
             };
-            worse_free_run("theta_out_rad", "rad", &fit)
+            let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 1.0 };
+            let compared = [(Series::Channel(Channel::ThetaOut), fit)];
+            summary(Verdict::MissingPhysics, &[], &[], false, &loss, &compared)
         };
+        let plain = said(0.01, true);
         assert_eq!(
-            said(36.0, true).unwrap(),
-            " In a free run it predicts theta_out_rad worse than the recalibrated rig does: 36.0 rad off instead of 1.00 rad. Compare both \
-             before you simulate with it."
+            said(36.0, true).strip_prefix(&plain).unwrap(),
+            " In a free run the diagnosed rig predicts theta_out_rad worse than the recalibrated rig does: 36.0 rad off instead of \
+             1.00 rad. Compare both before you simulate with it."
         );
-        assert_eq!((said(0.01, true), said(1.004, true), said(36.0, false)), (None, None, None));
+        assert_eq!((said(1.004, true), said(36.0, false)), (plain.clone(), plain));
     }
 
     /// A joint whose rig file has no mass, and whose arm turns out to be a tenth longer.
@@ -257,7 +269,7 @@ mod tests {
         let found =
             [recalibrated("load.mass_kg", "kg", 0.0, 0.512), recalibrated("load.arm_m", "m", 0.2, 0.22)];
         let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 4.0 };
-        let said = summary(Verdict::Recalibrate, &[], &found, false, &loss);
+        let said = summary(Verdict::Recalibrate, &[], &found, false, &loss, &[]);
         assert!(
             said.ends_with("Parameters that were wrong: load.mass_kg 0 to 0.512 kg, load.arm_m +10 %."),
             "{said}"
@@ -269,7 +281,7 @@ mod tests {
     fn a_summary_says_whether_the_held_out_loss_falls_and_whether_that_is_enough() {
         let said = |after: f64| {
             let loss = StageLoss { before: 9.0, recalibrated: 4.0, after };
-            summary(Verdict::Unexplained, &[], &[], true, &loss)
+            summary(Verdict::Unexplained, &[], &[], true, &loss, &[])
         };
         assert!(
             said(1.0).contains("a formula for it reduces the held-out loss from 4.00 to 1.00 (")
