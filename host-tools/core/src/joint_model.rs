@@ -5,6 +5,10 @@ use bowden_model::drive::{pulley_inertia_kg_m2, pulley_stall_torque_nm};
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
 use bowden_model::load::inertia_kg_m2;
+use bowden_model::paper::capstan::Direction;
+use bowden_model::paper::displacement_transmission::dead_zone_input_rad;
+use bowden_model::paper::pair::TendonPair;
+use bowden_model::paper::torque::LoopTorque;
 use bowden_model::parameters::JointParameters;
 use bowden_model::plant::{InputBoundary, OutputBoundary, PlantConfig};
 
@@ -234,6 +238,17 @@ impl JointModel {
         self.parameters.motor.as_ref().map_or(0.0, pulley_inertia_kg_m2) + load
     }
 
+    /// Travel of the input, rad, in which friction turns round along the whole sheath while the load stays: Eq. (23) of the paper, without a load. 0
+    /// without tendons or sheaths.
+    #[must_use]
+    pub fn dead_zone_rad(&self) -> f64 {
+        let JointParameters { pulleys, tendon, sheath, .. } = &self.parameters;
+        let (Some(pulleys), Some(tendon), Some(sheath)) = (pulleys, tendon, sheath) else { return 0.0 };
+        let unloaded = LoopTorque::Output(0.0);
+        TendonPair::uniform(pulleys, tendon, sheath)
+            .map_or(0.0, |pair| dead_zone_input_rad(&pair, Direction::Positive, unloaded, unloaded))
+    }
+
     /// Channel of the angle that guides the motor or is prescribed.
     #[must_use]
     pub fn guiding_channel(&self) -> Channel {
@@ -245,6 +260,15 @@ impl JointModel {
 mod tests {
     use super::*;
     use crate::test_bench;
+
+    #[test]
+    fn a_dead_zone_is_as_wide_as_friction_and_stretch_make_it() {
+        let model = JointModel::from_rig(&test_bench::rig(), &test_bench::swung(10)).unwrap();
+        // 2 · 30 N · 1 m · tanh(0.12 π / 2) / (72 900 N · 0.015 m).
+        assert!((model.dead_zone_rad() / 0.010_222 - 1.0).abs() < 1e-4, "{}", model.dead_zone_rad());
+        let direct = JointModel::from_rig(&test_bench::direct_rig(), &test_bench::turned(10, &[])).unwrap();
+        assert_eq!(direct.dead_zone_rad(), 0.0);
+    }
 
     #[test]
     fn a_joint_that_no_simulation_can_follow_is_refused() {

@@ -39,9 +39,9 @@ pub use sensors::through;
 pub enum Passes {
     /// Both.
     All,
-    /// The first alone, in a third of the time at a kilohertz. The outputs differ from those of both, because the stiff guide lets the pulley give way less. What a
-    /// change of the sheath's friction changes in them has the same course within a fifth, but up to 1.5 times the size, and what little
-    /// stiffness changes can differ more: enough to rank and to set out by, not to find a place or to judge.
+    /// The first alone, in a third of the time at a kilohertz. The outputs differ from those of both, because the stiff guide lets the pulley
+    /// give way less. What a change of the sheath's friction changes in them has the same course within a fifth, but up to 1.5 times the size,
+    /// and what little stiffness changes can differ more: enough to rank and to set out by, not to find a place or to judge.
     First,
 }
 

@@ -25,6 +25,9 @@ const FLUTTER_S: f64 = 0.5;
 /// Time at the start of each recording, and after a gap in it, that is not compared, s: how it came there is not known.
 const LEAD_IN_S: f64 = 0.3;
 
+/// Travel of the input after a gap from which on its history no longer matters, in dead zones: one turns all friction round where the load stays.
+const DEAD_ZONES_AFTER_GAP: f64 = 2.0;
+
 /// Length of the stretches that are held out, or confirm, in turn, s.
 const STRETCH_S: f64 = 1.0;
 
@@ -178,12 +181,20 @@ impl Dataset {
         let mut blocks: Vec<Block> = Vec::new();
         let mut start =
             t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
-        // What happened in a gap is not known, as at the start; within a block it is as good as none.
+        // What happened in a gap is not known, as at the start; within a block it is as good as none. A joint that stands behind one keeps what
+        // friction held there, until it has travelled through its dead zone.
+        let travelled = |from: usize| {
+            let travel_rad = DEAD_ZONES_AFTER_GAP * model.dead_zone_rad();
+            let Some(motion) = input.motion().filter(|_| travel_rad > 0.0) else { return from };
+            let angles_rad = &motion.theta_rad[from..];
+            let far = |angle_rad: &f64| (angle_rad - angles_rad[0]).abs() >= travel_rad;
+            angles_rad.iter().position(far).map_or(t_s.len(), |samples| from + samples)
+        };
         let gap_s = recording.gap_s().map_or(f64::INFINITY, |gap_s| gap_s.max(BLOCK_S));
         let follows_gap = |sample: usize| sample > 0 && t_s[sample] - t_s[sample - 1] > gap_s;
         while start < t_s.len() {
             if follows_gap(start) {
-                start = t_s.partition_point(|t| t - t_s[start] < LEAD_IN_S);
+                start = travelled(start).max(t_s.partition_point(|t| t - t_s[start] < LEAD_IN_S));
                 continue;
             }
             let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
