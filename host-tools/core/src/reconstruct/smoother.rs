@@ -25,6 +25,13 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Lowest and highest angle, rad.
+    #[must_use]
+    pub fn range_rad(&self) -> [f64; 2] {
+        let wider = |[low, high]: [f64; 2], rad: &f64| [low.min(*rad), high.max(*rad)];
+        self.theta_rad.iter().fold([f64::INFINITY, f64::NEG_INFINITY], wider)
+    }
+
     /// Reconstructs a recorded angle; one that is not quantised is taken as it is.
     #[must_use]
     pub fn from_encoder(t_s: &[f64], theta_rad: &[f64]) -> Self {

@@ -28,6 +28,10 @@ const LEAD_IN_S: f64 = 0.3;
 /// Travel of the input after a gap from which on its history no longer matters, in dead zones: one turns all friction round where the load stays.
 const DEAD_ZONES_AFTER_GAP: f64 = 2.0;
 
+/// The same as a part of the range of the recording, where that is less: in a motion within the dead zone no friction turns round as a whole, and the
+/// recording would end with its first gap.
+const RANGE_AFTER_GAP: f64 = 0.5;
+
 /// Length of the stretches that are held out, or confirm, in turn, s.
 const STRETCH_S: f64 = 1.0;
 
@@ -181,17 +185,20 @@ impl Dataset {
         let mut blocks: Vec<Block> = Vec::new();
         let mut start =
             t_s.partition_point(|t| t - t_s[0] < LEAD_IN_S.min(0.1 * (t_s[t_s.len() - 1] - t_s[0])));
-        // What happened in a gap is not known, as at the start; within a block it is as good as none. A joint that stands behind one keeps what
-        // friction held there, until it has travelled through its dead zone.
+        // What happened in a gap is not known, as at the start; within a block it is as good as none.
+        let gap_s = recording.gap_s().map_or(f64::INFINITY, |gap_s| gap_s.max(BLOCK_S));
+        let follows_gap = |sample: usize| sample > 0 && t_s[sample] - t_s[sample - 1] > gap_s;
+        // A joint that stands behind a gap keeps what friction held there, until it has travelled.
+        let travel_rad = input.motion().map_or(0.0, |motion| {
+            let [lowest, highest] = motion.range_rad();
+            (DEAD_ZONES_AFTER_GAP * model.dead_zone_rad()).min(RANGE_AFTER_GAP * (highest - lowest))
+        });
         let travelled = |from: usize| {
-            let travel_rad = DEAD_ZONES_AFTER_GAP * model.dead_zone_rad();
-            let Some(motion) = input.motion().filter(|_| travel_rad > 0.0) else { return from };
+            let Some(motion) = input.motion() else { return from };
             let angles_rad = &motion.theta_rad[from..];
             let far = |angle_rad: &f64| (angle_rad - angles_rad[0]).abs() >= travel_rad;
             angles_rad.iter().position(far).map_or(t_s.len(), |samples| from + samples)
         };
-        let gap_s = recording.gap_s().map_or(f64::INFINITY, |gap_s| gap_s.max(BLOCK_S));
-        let follows_gap = |sample: usize| sample > 0 && t_s[sample] - t_s[sample - 1] > gap_s;
         while start < t_s.len() {
             if follows_gap(start) {
                 start = travelled(start).max(t_s.partition_point(|t| t - t_s[start] < LEAD_IN_S));

@@ -183,14 +183,19 @@ fn what_follows_a_gap_is_not_compared() {
     assert_eq!(objective.residuals(&model).unwrap().values.len(), objective.entries().count());
 }
 
-/// Behind a gap of 0.1 s the joint stands for 0.9 s and then turns at 0.5 rad/s: two dead zones, 0.0204 rad, take 41 samples. Where it stands
-/// to the end nothing is compared any more.
+/// Behind a gap of 0.1 s the joint, which turned by 0.2 rad before, stands for 0.9 s and then goes on at 0.5 rad/s: two dead zones, 0.0204 rad, take
+/// 41 samples. Where it stands to the end nothing is compared any more. Where all its motion is within 0.011 rad half of that is enough, 458 samples
+/// at 0.012 rad/s.
 #[test]
 fn a_joint_that_stands_behind_a_gap_is_compared_again_when_it_has_moved() {
-    let begins = |moves_from: u32| {
+    let begins = |before_rad: f64, goes_on_at: usize, rad_s: f64| {
         let mut recording = test_bench::swung(4000);
-        let theta_rad = (0..4000).map(|k| 5e-4 * f64::from(k.max(moves_from) - moves_from));
-        recording.set(Channel::ThetaIn, theta_rad.collect());
+        let theta_rad = recording.t_s().iter().map(|t| {
+            let goes_on_s = (t - 1e-3 * goes_on_at as f64).clamp(0.0, 0.5);
+            before_rad * (t / 0.5).min(1.0) + rad_s * goes_on_s
+        });
+        let theta_rad = theta_rad.collect();
+        recording.set(Channel::ThetaIn, theta_rad);
         let kept: Vec<usize> = (0..1000).chain(1100..4000).collect();
         let of = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
         let mut gap = Recording::new("gap", of(recording.t_s()));
@@ -199,12 +204,15 @@ fn a_joint_that_stands_behind_a_gap_is_compared_again_when_it_has_moved() {
         }
         let model = JointModel::from_rig(&test_bench::rig(), &gap).unwrap();
         let objective = Objective::new(&model, &[gap], &[], true).unwrap();
-        objective.blocks(0).iter().map(|block| block.start).find(|start| *start >= 1000)
+        // Samples behind the gap have moved up by its 100.
+        let begins = objective.blocks(0).iter().map(|block| block.start).find(|start| *start >= 1000);
+        begins.map(|sample| sample + 100)
     };
-    // Samples behind the gap have moved up by its 100.
-    let first = begins(2000).unwrap();
-    assert!((1936..=1946).contains(&first), "{first}");
-    assert_eq!(begins(4000), None);
+    let far = begins(0.2, 2000, 0.5).unwrap();
+    assert!((2036..=2046).contains(&far), "{far}");
+    assert_eq!(begins(0.2, 4000, 0.0), None);
+    let near = begins(0.005, 2000, 0.012).unwrap();
+    assert!((2453..=2464).contains(&near), "{near}");
 }
 
 /// Residuals that are recalled are those of a simulation, bit for bit, and belong to the joint that was asked for.
