@@ -1,9 +1,5 @@
 //! One pass of a replay: from sample to sample, in steps that the plant bears.
-//!
-//! A pass that only finds the guiding torque, or shows what changes, is simulated from every other sample to the next at a kilohertz, by the mean of
-//! what the recording says in between.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
@@ -20,51 +16,20 @@ use super::prediction::Sink;
 use super::sensors::Sampler;
 use crate::joint_model::{Drive, JointModel};
 
-/// Longest step of a rough pass, s.
-const ROUGH_STEP_S: f64 = 2e-3;
-
-/// Steps of a rough pass over those that keep well inside stability: half of what is unstable, where the stiffest oscillation that there may be is
-/// 5 % too fast.
-const NEARER_TO_STABILITY: f64 = 1.5;
-
 /// A model and the recording that drives it.
 pub(super) struct Run<'a> {
     pub model: &'a JointModel,
     pub config: &'a PlantConfig,
     pub input: &'a ReplayInput,
     pub drive: Drive,
-    pub pace: Pace,
-}
-
-/// How finely a pass is simulated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pace {
-    /// Samples from one that is simulated to the next.
-    stride: usize,
-    /// Longest step, s.
-    longest_s: f64,
-}
-
-impl Pace {
-    /// Every sample, in steps no longer than the model's.
-    pub fn whole(model: &JointModel, config: &PlantConfig) -> Self {
-        Self { stride: 1, longest_s: model.step_s.min(config.stable_step_s()) }
-    }
-
-    /// As many samples at a time, and steps as long, as the plant bears, up to [`ROUGH_STEP_S`].
-    pub fn rough(input: &ReplayInput, config: &PlantConfig) -> Self {
-        let longest_s = ROUGH_STEP_S.min(NEARER_TO_STABILITY * config.stable_step_s());
-        let samples = (longest_s / input.step_s + 1e-6).floor();
-        Self { stride: (samples as usize).max(1), longest_s }
-    }
 }
 
 impl Run<'_> {
-    /// One pass; only `outputs` are sampled. Samples inside a stride show what its end does.
+    /// One pass; only `outputs` are sampled.
     pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) {
         let input = self.input;
         let n = input.t_s.len();
-        let Pace { stride, longest_s } = self.pace;
+        let longest_s = self.model.step_s.min(self.config.stable_step_s());
         let effects = self.config.effects();
         let mut states = FRESH_STATES;
         let guiding = self.model.guiding_channel();
@@ -82,20 +47,18 @@ impl Run<'_> {
             plant.set_speed_rad_s(input.start_rad_s);
         }
         let recorded = Recorded::of(self);
-        plant.settle(self.config, &recorded.step_input(0..1, start_rad));
+        plant.settle(self.config, &recorded.step_input(0, start_rad));
         let mut sampler = Sampler::new(outputs, effects);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
         // Error of the angle as the lead of the guide has it.
         let mut late_rad = 0.0;
-        let strides = (0..n.min(1)).chain((1..n).step_by(stride).map(|first| (first + stride).min(n) - 1));
-        let mut before = 0;
-        for k in strides {
+        for k in 0..n {
             if sink.is_stopped() {
                 return;
             }
             let mut torque_sum = 0.0;
-            let span_s = input.t_s[k] - input.t_s[before];
+            let span_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
             if k > 0 {
                 let from_rad = wanted_rad;
                 wanted_rad = theta_in_rad(k, span_s);
@@ -108,7 +71,7 @@ impl Run<'_> {
                         from_rad.zip(wanted_rad).map_or(0.0, |(from, to)| from + (to - from) * share)
                     };
                     // An angle that is prescribed is the one at the end of the step.
-                    let mut step = recorded.step_input(before..k, recorded_rad(sub));
+                    let mut step = recorded.step_input(k - 1, recorded_rad(sub));
                     match self.drive {
                         Drive::GuidedMotor => {
                             let band = input
@@ -141,7 +104,7 @@ impl Run<'_> {
                         }
                         Drive::Servo => {
                             if let (Some(servo), Some(reference)) = (self.model.servo, &input.theta_ref_rad) {
-                                let error = reference[before] - delayed.at(plant.t_s(), plant.theta_in_rad());
+                                let error = reference[k - 1] - delayed.at(plant.t_s(), plant.theta_in_rad());
                                 step.bridge.duty = (servo.gain_duty_per_rad * error)
                                     .clamp(-servo.duty_limit, servo.duty_limit);
                             }
@@ -153,10 +116,7 @@ impl Run<'_> {
                 }
             }
             let outputs = sampler.sample(self.config, &plant, duty, (input.clock_at_s(k), span_s));
-            for _ in before..k.max(1) {
-                sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
-            }
-            before = k;
+            sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
         }
     }
 
@@ -188,14 +148,10 @@ impl<'a> Recorded<'a> {
         }
     }
 
-    /// Input of a step by what these samples say, on average.
+    /// Input of a step after sample `k`.
     #[inline]
-    fn step_input(&self, samples: Range<usize>, theta_in_rad: f64) -> StepInput {
-        let mean = |values: &[f64]| match &values[samples.clone()] {
-            [value] => *value,
-            several => several.iter().sum::<f64>() / several.len() as f64,
-        };
-        let at = |values: Option<&[f64]>, otherwise: f64| values.map_or(otherwise, mean);
+    fn step_input(&self, k: usize, theta_in_rad: f64) -> StepInput {
+        let at = |values: Option<&[f64]>, otherwise: f64| values.map_or(otherwise, |v| v[k]);
         StepInput {
             bridge: BridgeInput {
                 duty: at(self.duty, 0.0),
