@@ -193,16 +193,22 @@ impl Dataset {
             let [lowest, highest] = motion.range_rad();
             (DEAD_ZONES_AFTER_GAP * model.dead_zone_rad()).min(RANGE_AFTER_GAP * (highest - lowest))
         });
-        let travelled = |from: usize| {
-            let Some(motion) = input.motion() else { return from };
-            let angles_rad = &motion.theta_rad[from..];
-            let far = |angle_rad: &f64| (angle_rad - angles_rad[0]).abs() >= travel_rad;
-            angles_rad.iter().position(far).map_or(t_s.len(), |samples| from + samples)
+        let angle_rad = |sample: usize| input.motion().map_or(0.0, |motion| motion.theta_rad[sample]);
+        let resumes = |gap: usize| {
+            let (mut behind, mut has_travelled) = (gap, false);
+            (gap..t_s.len()).find(|&sample| {
+                // Another gap begins the wait anew.
+                if follows_gap(sample) {
+                    (behind, has_travelled) = (sample, false);
+                }
+                has_travelled |= (angle_rad(sample) - angle_rad(behind)).abs() >= travel_rad;
+                has_travelled && t_s[sample] - t_s[behind] >= LEAD_IN_S
+            })
         };
         while start < t_s.len() {
             if follows_gap(start) {
-                start = travelled(start).max(t_s.partition_point(|t| t - t_s[start] < LEAD_IN_S));
-                continue;
+                let Some(resumed) = resumes(start) else { break };
+                start = resumed;
             }
             let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
             let stretch = ((t_s[start] - t_s[0]) / STRETCH_S) as usize;

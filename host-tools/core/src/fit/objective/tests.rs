@@ -1,5 +1,7 @@
 //! What is compared, and what is not.
 
+use std::ops::Range;
+
 use bowden_model::effect::Target;
 use bowden_model::effects::find;
 
@@ -185,10 +187,10 @@ fn what_follows_a_gap_is_not_compared() {
 
 /// Behind a gap of 0.1 s the joint, which turned by 0.2 rad before, stands for 0.9 s and then goes on at 0.5 rad/s: two dead zones, 0.0204 rad, take
 /// 41 samples. Where it stands to the end nothing is compared any more. Where all its motion is within 0.011 rad half of that is enough, 458 samples
-/// at 0.012 rad/s.
+/// at 0.012 rad/s. Another gap on the way begins the wait anew.
 #[test]
 fn a_joint_that_stands_behind_a_gap_is_compared_again_when_it_has_moved() {
-    let begins = |before_rad: f64, goes_on_at: usize, rad_s: f64| {
+    let begins = |before_rad: f64, goes_on_at: usize, rad_s: f64, lost_again: Range<usize>| {
         let mut recording = test_bench::swung(4000);
         let theta_rad = recording.t_s().iter().map(|t| {
             let goes_on_s = (t - 1e-3 * goes_on_at as f64).clamp(0.0, 0.5);
@@ -196,7 +198,8 @@ fn a_joint_that_stands_behind_a_gap_is_compared_again_when_it_has_moved() {
         });
         let theta_rad = theta_rad.collect();
         recording.set(Channel::ThetaIn, theta_rad);
-        let kept: Vec<usize> = (0..1000).chain(1100..4000).collect();
+        let is_kept = |row: &usize| !(1000..1100).contains(row) && !lost_again.contains(row);
+        let kept: Vec<usize> = (0..4000).filter(is_kept).collect();
         let of = |values: &[f64]| kept.iter().map(|row| values[*row]).collect::<Vec<f64>>();
         let mut gap = Recording::new("gap", of(recording.t_s()));
         for channel in recording.channels() {
@@ -204,15 +207,17 @@ fn a_joint_that_stands_behind_a_gap_is_compared_again_when_it_has_moved() {
         }
         let model = JointModel::from_rig(&test_bench::rig(), &gap).unwrap();
         let objective = Objective::new(&model, &[gap], &[], true).unwrap();
-        // Samples behind the gap have moved up by its 100.
         let begins = objective.blocks(0).iter().map(|block| block.start).find(|start| *start >= 1000);
-        begins.map(|sample| sample + 100)
+        begins.map(|sample| kept[sample])
     };
-    let far = begins(0.2, 2000, 0.5).unwrap();
+    let far = begins(0.2, 2000, 0.5, 0..0).unwrap();
     assert!((2036..=2046).contains(&far), "{far}");
-    assert_eq!(begins(0.2, 4000, 0.0), None);
-    let near = begins(0.005, 2000, 0.012).unwrap();
+    assert_eq!(begins(0.2, 4000, 0.0, 0..0), None);
+    let near = begins(0.005, 2000, 0.012, 0..0).unwrap();
     assert!((2453..=2464).contains(&near), "{near}");
+    // After 0.018 rad; the dead zones behind it end before the 0.3 s do.
+    let again = begins(0.2, 2000, 0.1, 2100..2180).unwrap();
+    assert!((2480..=2481).contains(&again), "{again}");
 }
 
 /// Residuals that are recalled are those of a simulation, bit for bit, and belong to the joint that was asked for.
