@@ -1,5 +1,6 @@
 //! `cargo xtask clippy`: lints of the whole workspace, warnings as errors.
 
+use crate::parts::Parts;
 use crate::process::{self, cargo};
 use crate::{cross_target, firmware, python, selection, system_packages};
 
@@ -7,15 +8,24 @@ use crate::{cross_target, firmware, python, selection, system_packages};
 ///
 /// # Errors
 /// When there is a warning, or something that is needed for building is missing.
-pub fn run() -> Result<(), String> {
+pub fn run(parts: Parts) -> Result<(), String> {
+    if parts.host() {
+        host()?;
+    }
+    if parts.board() {
+        cross_target::ensure()?;
+        firmware::clippy()?;
+    }
+    Ok(())
+}
+
+fn host() -> Result<(), String> {
     system_packages::ensure()?;
-    cross_target::ensure()?;
     let python = python::interpreter();
     if let Err(reason) = &python {
         println!("the Python module is not checked: {reason}");
     }
     let mut clippy = cargo(&["clippy", "--all-targets"]);
     clippy.args(selection::for_the_host(python.is_ok())).args(["--", "-D", "warnings"]);
-    process::run(&mut clippy, &[0])?;
-    firmware::clippy()
+    process::run(&mut clippy, &[0])
 }

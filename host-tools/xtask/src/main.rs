@@ -13,6 +13,7 @@ mod files;
 mod firmware;
 mod fuzz;
 mod image_size;
+mod linted;
 mod memory_map;
 mod paper;
 mod parts;
@@ -31,6 +32,8 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 
+use parts::Parts;
+
 /// What is done with this workspace
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", subcommand_required = true, arg_required_else_help = false)]
@@ -43,7 +46,7 @@ struct Cli {
 enum Task {
     /// Record a simulated bench that conceals a fault and let `bowden diagnose` find it
     Demo,
-    /// Run all tests, those of the board's images on the emulated board among them
+    /// Lint what is built for the host, and run all tests, those of the board's images on the emulated board among them
     Test(test::Options),
     /// Run all benchmarks: speed of model and bench, gain of the motion reconstruction, cost on the board
     Bench(bench::Options),
@@ -61,8 +64,8 @@ enum Task {
     Endure(board_page::Options),
     /// Build the release images for the driver board and print what they take of its memory
     Firmware,
-    /// Run clippy on everything, the board's images among it; warnings are errors
-    Clippy,
+    /// Run clippy on everything, the board's images among it; warnings are errors. What `test` compiles is linted there too
+    Clippy(Parts),
 }
 
 fn main() -> ExitCode {
@@ -76,7 +79,7 @@ fn main() -> ExitCode {
         Ok(Cli { task: Task::Faults(options) }) => board_page::FAULTS.run(&options),
         Ok(Cli { task: Task::Endure(options) }) => board_page::ENDURE.run(&options),
         Ok(Cli { task: Task::Firmware }) => firmware::run(),
-        Ok(Cli { task: Task::Clippy }) => clippy::run(),
+        Ok(Cli { task: Task::Clippy(parts) }) => clippy::run(parts),
         Err(error) => return usage(&error),
     };
     match done {

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::linted::linted;
 use crate::process::{self, Said, built, cargo, find_program, target_folder, workspace};
 
 /// Package and crate, below the workspace.
@@ -51,7 +52,7 @@ pub fn tests(programs_are_built: bool, said: Said) -> Result<String, String> {
     let folder = target_folder()?.join(FOLDER);
     let environment = environment(&interpreter, &folder, OF_TESTS, said)?;
     if !programs_are_built {
-        said.run(&mut cargo(&["build", "--package", "bowden", "--package", "virtual-bench"]))?;
+        said.run(linted(&mut cargo(&["build", "--package", "bowden", "--package", "virtual-bench"])))?;
     }
     install_wheel(&environment, &folder, "dev", said)?;
 
@@ -134,7 +135,8 @@ pub fn install_wheel(environment: &Path, folder: &Path, profile: &str, said: Sai
     maturin.current_dir(workspace()).args(["build", "--profile", profile, "--locked", "--manifest-path"]);
     maturin.arg(format!("{PACKAGE}/Cargo.toml")).arg("--out").arg(&wheels);
     maturin.arg("--interpreter").arg(program(environment, "python"));
-    said.run(&mut maturin)?;
+    // The same packages as for the tests of the host, compiled for both.
+    said.run(if profile == "dev" { linted(&mut maturin) } else { &mut maturin })?;
     let entries = fs::read_dir(&wheels).map_err(|error| format!("{}: {error}", wheels.display()))?;
     let files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     let wheel = wheel_for_every_python(&files).map_err(|error| format!("{}: {error}", wheels.display()))?;

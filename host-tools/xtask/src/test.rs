@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::firmware::Image;
+use crate::linted::{linted, unlinted};
 use crate::parts::Parts;
 use crate::process::{self, Said, built, cargo, shared, target_folder};
 use crate::tally::Tally;
@@ -175,15 +176,19 @@ impl Programs {
 
     /// Builds them, and the command that they start.
     fn build(&self) -> Result<(), String> {
-        if !self.host {
-            process::run(&mut cargo(&["build", "--package", "bowden"]), &[0])?;
+        if let Some(reason) = unlinted() {
+            println!("{reason}");
         }
-        process::run(cargo(&["test", "--no-run"]).args(&self.selected), &[0])
+        if !self.host {
+            process::run(linted(&mut cargo(&["build", "--package", "bowden"])), &[0])?;
+        }
+        // Benchmarks among them, which are not run here.
+        process::run(linted(&mut cargo(&["test", "--no-run", "--all-targets"])).args(&self.selected), &[0])
     }
 
     fn run(&self) -> Result<String, String> {
         let mut tests = cargo(&["test", "--no-fail-fast"]);
-        tests.args(&self.selected);
+        linted(&mut tests).args(&self.selected);
         firmware::announce(&self.images, &mut tests);
         tests.env("BOWDEN_BIN", built("debug", "bowden")?);
         if self.host && lacks_recordings_or_browser() {
