@@ -76,6 +76,9 @@ const SEARCH_ELEMENTS: std::ops::RangeInclusive<usize> = 4..=8;
 /// Simulation step while candidates are tried, s.
 const SEARCH_STEP_S: f64 = 1e-3;
 
+/// Of these steps the pass that finds the torque which guides a motor takes so many at a time: a filter of 30 ms keeps what is slow.
+const SEARCH_GUIDE_STRIDE: usize = 2;
+
 /// Optimiser evaluations per parameter of the last fit.
 const FINAL_PATIENCE: usize = 8;
 
@@ -341,12 +344,18 @@ fn at_search_resolution(model: &JointModel, stated: &JointModel) -> JointModel {
     JointModel {
         elements: stated.elements.min(search_elements(stated)),
         step_s: stated.step_s.max(SEARCH_STEP_S),
+        guide_stride: SEARCH_GUIDE_STRIDE,
         ..model.clone()
     }
 }
 
 fn at_full_resolution(searched: &JointModel, model: &JointModel) -> JointModel {
-    JointModel { elements: model.elements, step_s: model.step_s, ..searched.clone() }
+    JointModel {
+        elements: model.elements,
+        step_s: model.step_s,
+        guide_stride: model.guide_stride,
+        ..searched.clone()
+    }
 }
 
 /// Fits `start`, which is `model` with other values and more effects, to all data that may be fitted; without rounds only its

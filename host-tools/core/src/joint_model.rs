@@ -52,6 +52,8 @@ pub struct JointModel {
     pub elements: usize,
     /// Longest simulation step, s.
     pub step_s: f64,
+    /// How many of these steps the pass that finds the torque which guides a motor may take at a time, at least 1.
+    pub guide_stride: usize,
     /// Servo, where the duty follows from the reference.
     pub servo: Option<ProportionalLaw>,
     /// Channels that drive a replay.
@@ -184,6 +186,7 @@ impl JointModel {
             effects: rig.effects.clone(),
             elements: rig.elements,
             step_s: rig.step_s,
+            guide_stride: 1,
             servo: rig.controller,
             inputs: roles.inputs,
             outputs: roles.outputs,

@@ -4,7 +4,8 @@
 //! stiff enough to follow, soft enough that what an encoder cannot resolve comes from the physics. A first pass finds
 //! the guiding torque; its slow part, filtered without phase, is what friction or a wrong parameter took from the
 //! motor, and the second pass applies it ahead so that the guide itself can be soft. The guide pulls only where the
-//! simulated angle leaves the uncertainty of the reconstructed one.
+//! simulated angle leaves the uncertainty of the reconstructed one. Of the first pass nothing is kept that is faster than the filter: a search
+//! simulates it in longer steps.
 //!
 //! Without tendons a soft guide keeps the joint from drifting away in a single pass, see `guide`.
 //!
@@ -30,7 +31,7 @@ use guide::{FILTER_S, Guide};
 pub use input::ReplayInput;
 pub use prediction::{Prediction, Sink};
 use prediction::{StoppedBy, Watched};
-use run::Run;
+use run::{Pace, Run};
 pub use sensors::through;
 
 /// Which of the two passes of a guided motor are simulated; other drives have one.
@@ -42,6 +43,8 @@ pub enum Passes {
     /// change of the sheath's friction changes in them has the same course within a fifth, but up to 1.5 times the size, and what little
     /// stiffness changes can differ more: enough to rank and to set out by, not to find a place or to judge.
     First,
+    /// The same in steps as long as those that find the guiding torque: enough to rank what has no moment.
+    Rough,
 }
 
 impl Passes {
@@ -127,7 +130,7 @@ pub fn replay_passes_into(
 ) -> Result<(), Failure> {
     let config = model.plant()?;
     let drive = model.drive()?;
-    let run = Run { model, config: &config, input, drive };
+    let run = Run { model, config: &config, input, drive, pace: Pace::whole(model, &config) };
     if drive != Drive::GuidedMotor {
         run.execute(Guide::NONE, outputs, sink);
         return Ok(());
@@ -136,22 +139,34 @@ pub fn replay_passes_into(
         run.execute(input.hold.only_pass(model), outputs, sink);
         return Ok(());
     }
-    let stiff = input.hold.first_pass();
     if passes == Passes::First {
-        run.execute(stiff, outputs, sink);
+        run.execute(input.hold.first_pass(), outputs, sink);
         return Ok(());
     }
-    let first = Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(input.t_s.len()) };
-    let mut first = StoppedBy { prediction: first, sink };
-    run.execute(stiff, &[], &mut first);
-    let StoppedBy { prediction: first, sink } = first;
+    let rough = Run { pace: Pace::rough(model, input, &config), ..run };
+    if passes == Passes::Rough {
+        rough.execute(input.hold.first_pass(), outputs, sink);
+        return Ok(());
+    }
+    let ahead_nm = rough.ahead_nm(sink);
     if sink.is_stopped() {
         return Ok(());
     }
-    let half = (FILTER_S / input.step_s).round() as usize;
-    let ahead_nm = moving_average(moving_average(first.guide_nm, half), half);
     run.execute(input.hold.second_pass(&ahead_nm), outputs, sink);
     Ok(())
+}
+
+impl Run<'_> {
+    /// Torque that a second pass applies ahead, at each sample, N·m: what guides the motor in this pass, without what is fast. It ends early where
+    /// `sink` is stopped.
+    fn ahead_nm(&self, sink: &mut impl Sink) -> Vec<f64> {
+        let prediction =
+            Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(self.input.t_s.len()) };
+        let mut first = StoppedBy { prediction, sink };
+        self.execute(self.input.hold.first_pass(), &[], &mut first);
+        let half = (FILTER_S / self.input.step_s).round() as usize;
+        moving_average(moving_average(first.prediction.guide_nm, half), half)
+    }
 }
 
 #[cfg(test)]
@@ -252,6 +267,34 @@ mod tests {
             let beside = (1.0 - along * dot(&first, &both) / dot(&first, &first)).sqrt();
             assert!((0.9..1.5).contains(&along) && beside < 0.2, "{}: {along}, {beside}", channel.role());
         }
+    }
+
+    /// A first pass of half as many steps finds the torque that one of every sample finds: the duty swings at 0.64 Hz, with a ripple of 333 Hz of
+    /// which every other sample alone would show a torque that is not there. One sample is left over at the end.
+    #[test]
+    fn a_rough_first_pass_finds_the_torque_that_a_whole_one_finds() {
+        let samples = 4002;
+        let (model, mut recording) = guided(samples);
+        let model = JointModel { elements: 4, step_s: 1e-3, guide_stride: 2, ..model };
+        let rippled = recording.channel(Channel::Duty).unwrap().iter().enumerate();
+        let rippled = rippled.map(|(k, duty)| duty + if k % 2 == 0 { 0.05 } else { -0.05 }).collect();
+        recording.set(Channel::Duty, rippled);
+        let input = ReplayInput::new(&model, &recording).unwrap();
+        let config = model.plant().unwrap();
+        let [whole, rough] =
+            [Pace::whole(&model, &config), Pace::rough(&model, &input, &config)].map(|pace| {
+                let run =
+                    Run { model: &model, config: &config, input: &input, drive: Drive::GuidedMotor, pace };
+                run.ahead_nm(&mut Prediction::default())
+            });
+        assert_eq!((whole.len(), rough.len()), (samples as usize, samples as usize));
+        assert!(whole != rough, "the rough pass is no other");
+        let rms = |values: &mut dyn Iterator<Item = f64>| {
+            (values.map(|value| value * value).sum::<f64>() / f64::from(samples)).sqrt()
+        };
+        let torque_nm = rms(&mut whole.iter().copied());
+        let apart_nm = rms(&mut whole.iter().zip(&rough).map(|(whole, rough)| whole - rough));
+        assert!(apart_nm < 0.01 * torque_nm, "{apart_nm} of {torque_nm} N·m");
     }
 
     /// How late a guided angle is does not follow from the step: held against the end of its step it would run ahead by a step.

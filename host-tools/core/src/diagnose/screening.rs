@@ -123,10 +123,13 @@ pub fn screen(
     let rows_now = rows(objective, &present.solution.residuals);
     let now = basis.without(&rows_now);
     let model = &present.solution.model;
-    let first_pass = (Passes::roughly(model).ok() == Some(Passes::First))
-        .then(|| objective.residuals_in(Passes::First, model).ok().filter(Residuals::is_finite))
+    let missing_in = |passes: Passes| {
+        let seen = objective.residuals_in(passes, model).ok().filter(Residuals::is_finite)?;
+        Some(&rows_now - rows(objective, &seen))
+    };
+    let missing = (Passes::roughly(model).ok() == Some(Passes::First))
+        .then(|| Some(Missing { first: missing_in(Passes::First)?, rough: missing_in(Passes::Rough)? }))
         .flatten();
-    let missing = first_pass.map(|first| &rows_now - rows(objective, &first));
     let loss_now = now.norm_squared();
     let background = Background { objective, present, basis, missing, rows_now, now, loss_now };
     let starts: Vec<(usize, ActiveEffect)> = candidates
@@ -191,13 +194,26 @@ pub fn screen(
     screened
 }
 
+/// What rows of first passes lack to those of whole replays, as the present model shows it.
+struct Missing {
+    first: DVector<f64>,
+    rough: DVector<f64>,
+}
+
+impl Missing {
+    /// What is enough to rank a start, and what lacks there. What happens at a moment shows in few residuals.
+    fn of(&self, start: &ActiveEffect) -> (Passes, &DVector<f64>) {
+        if moment_of(start).is_some() { (Passes::First, &self.first) } else { (Passes::Rough, &self.rough) }
+    }
+}
+
 /// What every start is compared with.
 struct Background<'a> {
     objective: &'a Objective,
     present: &'a Present<'a>,
     basis: Basis,
-    /// What rows of first passes lack to those of whole replays, as the present model shows it; `None` where replays are simulated whole.
-    missing: Option<DVector<f64>>,
+    /// `None` where replays are simulated whole.
+    missing: Option<Missing>,
     /// Residuals of the present model.
     rows_now: DVector<f64>,
     /// What the present parameters cannot take off.
@@ -377,11 +393,12 @@ impl Background<'_> {
     /// Rows of an effect beside a model, as whole replays would show them; `None` where they cannot be simulated.
     fn rows_beside(&self, model: &JointModel, start: ActiveEffect) -> Option<DVector<f64>> {
         let with = self.present.layout.with(model, start).1;
-        let passes = if self.missing.is_some() { Passes::First } else { Passes::All };
+        let missing = self.missing.as_ref().map(|missing| missing.of(&start));
+        let passes = missing.map_or(Passes::All, |(passes, _)| passes);
         let there = self.objective.residuals_in(passes, &with).ok().filter(Residuals::is_finite)?;
         let there = rows(self.objective, &there);
-        Some(match &self.missing {
-            Some(missing) => there + missing,
+        Some(match missing {
+            Some((_, missing)) => there + missing,
             None => there,
         })
     }

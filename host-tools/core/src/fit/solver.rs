@@ -181,6 +181,8 @@ fn solve_knowing(
     let mut current = Some(start).filter(Residuals::is_finite);
     // Slopes where the round before ended, if they were simulated there, with the step of their quotients.
     let mut ended: Option<(f64, Start)> = None;
+    // Slopes near there.
+    let mut nearby: Option<(f64, Start)> = None;
     let found_with =
         |step, ended: Option<(f64, Start)>| ended.filter(|(with, _)| *with == step).map(|(_, begun)| begun);
     for (round, &step) in rounds.iter().enumerate() {
@@ -196,6 +198,7 @@ fn solve_knowing(
             current,
             begun,
             stood: Mutex::default(),
+            simulated: Mutex::default(),
         };
         if known.is_none() {
             problem.weigh_priors();
@@ -212,13 +215,14 @@ fn solve_knowing(
         let (problem, _report) = optimiser.minimize(problem);
         refuse_interrupted(progress)?;
         ended = problem.simulated_slopes().map(|begun| (step, begun));
+        nearby = problem.slopes_nearby().map(|begun| (step, begun));
         (x, current) = (problem.x, problem.current);
         let mut newly = false;
         for (j, free) in free.iter().enumerate() {
             if !fixed[j] && free.at_bound(free.value_at(x[j])) {
                 fixed[j] = true;
                 newly = true;
-                ended = None;
+                (ended, nearby) = (None, None);
             }
         }
         let repeated = round > 0 && rounds[round - 1] == step;
@@ -226,7 +230,7 @@ fn solve_knowing(
             break;
         }
     }
-    let begun = found_with(FINE_STEP, ended);
+    let begun = found_with(FINE_STEP, nearby);
     let model = fit.model_at(&x);
     let values: Vec<f64> = free.iter().zip(x.iter()).map(|(free, x)| free.value_at(*x)).collect();
     let mut residuals = match current {

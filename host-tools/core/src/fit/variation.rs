@@ -38,6 +38,7 @@ impl Variation {
         let mut model = JointModel {
             elements: shared.elements,
             step_s: shared.step_s,
+            guide_stride: shared.guide_stride,
             own: OwnParameters::default(),
             ..self.base.clone()
         };

@@ -1,5 +1,9 @@
 //! One pass of a replay: from sample to sample, in steps that the plant bears.
+//!
+//! A rough pass, which only finds the guiding torque or ranks what changes, may go from every other sample to the next, by the mean of what the
+//! recording says in between.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bowden_model::channel::Channel;
@@ -16,20 +20,52 @@ use super::prediction::Sink;
 use super::sensors::Sampler;
 use crate::joint_model::{Drive, JointModel};
 
+/// Steps of a rough pass over those that keep well inside stability: half of what is unstable, where the stiffest oscillation that there may be is
+/// 5 % too fast.
+const NEARER_TO_STABILITY: f64 = 1.5;
+
 /// A model and the recording that drives it.
 pub(super) struct Run<'a> {
     pub model: &'a JointModel,
     pub config: &'a PlantConfig,
     pub input: &'a ReplayInput,
     pub drive: Drive,
+    pub pace: Pace,
+}
+
+/// How finely a pass is simulated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pace {
+    /// Samples from one that is simulated to the next.
+    stride: usize,
+    /// Longest step, s.
+    longest_s: f64,
+}
+
+impl Pace {
+    /// Every sample, in steps no longer than the model's.
+    pub fn whole(model: &JointModel, config: &PlantConfig) -> Self {
+        Self { stride: 1, longest_s: model.step_s.min(config.stable_step_s()) }
+    }
+
+    /// As many samples at a time, and steps as long, as the plant bears, up to the model's stride.
+    pub fn rough(model: &JointModel, input: &ReplayInput, config: &PlantConfig) -> Self {
+        if model.guide_stride <= 1 {
+            return Self::whole(model, config);
+        }
+        let longest_s =
+            (model.guide_stride as f64 * model.step_s).min(NEARER_TO_STABILITY * config.stable_step_s());
+        let samples = (longest_s / input.step_s + 1e-6).floor();
+        Self { stride: (samples as usize).max(1), longest_s }
+    }
 }
 
 impl Run<'_> {
-    /// One pass; only `outputs` are sampled.
+    /// One pass; only `outputs` are sampled. Samples inside a stride show what its end does.
     pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) {
         let input = self.input;
         let n = input.t_s.len();
-        let longest_s = self.model.step_s.min(self.config.stable_step_s());
+        let Pace { stride, longest_s } = self.pace;
         let effects = self.config.effects();
         let mut states = FRESH_STATES;
         let guiding = self.model.guiding_channel();
@@ -47,18 +83,20 @@ impl Run<'_> {
             plant.set_speed_rad_s(input.start_rad_s);
         }
         let recorded = Recorded::of(self);
-        plant.settle(self.config, &recorded.step_input(0, start_rad));
+        plant.settle(self.config, &recorded.step_input(0..1, start_rad));
         let mut sampler = Sampler::new(outputs, effects);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
         // Error of the angle as the lead of the guide has it.
         let mut late_rad = 0.0;
-        for k in 0..n {
+        let strides = (0..n.min(1)).chain((1..n).step_by(stride).map(|first| (first + stride).min(n) - 1));
+        let mut before = 0;
+        for k in strides {
             if sink.is_stopped() {
                 return;
             }
             let mut torque_sum = 0.0;
-            let span_s = if k == 0 { 0.0 } else { input.t_s[k] - input.t_s[k - 1] };
+            let span_s = input.t_s[k] - input.t_s[before];
             if k > 0 {
                 let from_rad = wanted_rad;
                 wanted_rad = theta_in_rad(k, span_s);
@@ -71,7 +109,7 @@ impl Run<'_> {
                         from_rad.zip(wanted_rad).map_or(0.0, |(from, to)| from + (to - from) * share)
                     };
                     // An angle that is prescribed is the one at the end of the step.
-                    let mut step = recorded.step_input(k - 1, recorded_rad(sub));
+                    let mut step = recorded.step_input(before..k, recorded_rad(sub));
                     match self.drive {
                         Drive::GuidedMotor => {
                             let band = input
@@ -104,7 +142,7 @@ impl Run<'_> {
                         }
                         Drive::Servo => {
                             if let (Some(servo), Some(reference)) = (self.model.servo, &input.theta_ref_rad) {
-                                let error = reference[k - 1] - delayed.at(plant.t_s(), plant.theta_in_rad());
+                                let error = reference[before] - delayed.at(plant.t_s(), plant.theta_in_rad());
                                 step.bridge.duty = (servo.gain_duty_per_rad * error)
                                     .clamp(-servo.duty_limit, servo.duty_limit);
                             }
@@ -116,7 +154,10 @@ impl Run<'_> {
                 }
             }
             let outputs = sampler.sample(self.config, &plant, duty, (input.clock_at_s(k), span_s));
-            sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
+            for _ in before..k.max(1) {
+                sink.sample(outputs, (self.drive == Drive::GuidedMotor).then_some(torque_sum));
+            }
+            before = k;
         }
     }
 
@@ -148,10 +189,14 @@ impl<'a> Recorded<'a> {
         }
     }
 
-    /// Input of a step after sample `k`.
+    /// Input of a step by what these samples say, on average.
     #[inline]
-    fn step_input(&self, k: usize, theta_in_rad: f64) -> StepInput {
-        let at = |values: Option<&[f64]>, otherwise: f64| values.map_or(otherwise, |v| v[k]);
+    fn step_input(&self, samples: Range<usize>, theta_in_rad: f64) -> StepInput {
+        let mean = |values: &[f64]| match &values[samples.clone()] {
+            [value] => *value,
+            several => several.iter().sum::<f64>() / several.len() as f64,
+        };
+        let at = |values: Option<&[f64]>, otherwise: f64| values.map_or(otherwise, mean);
         StepInput {
             bridge: BridgeInput {
                 duty: at(self.duty, 0.0),

@@ -31,6 +31,9 @@ const KEPT: f64 = 0.25;
 /// own. Carried on further there, fits stop beside the place: the play of a joint came out 3.4 % too small.
 const CARRIED_ON: [usize; 2] = [10, 1];
 
+/// Part of the step of their quotients within which slopes stand for those of a place nearby: they are means over as much on either side.
+const NEARBY: f64 = 0.5;
+
 /// A fit as the optimiser sees it.
 pub(super) struct Problem<'a> {
     pub(super) fit: &'a Fit,
@@ -49,6 +52,8 @@ pub(super) struct Problem<'a> {
     pub(super) begun: Option<Start>,
     /// Where the optimiser stood last.
     pub(super) stood: Mutex<Option<Place>>,
+    /// The last place whose slopes were simulated.
+    pub(super) simulated: Mutex<Option<Start>>,
 }
 
 /// A place, and the slopes that were simulated there.
@@ -103,6 +108,19 @@ impl Problem<'_> {
         let begun = self.begun.as_ref().map(|(x, slopes)| (x, slopes));
         let here = stood.into_iter().chain(begun).find(|(x, _)| **x == self.x);
         here.map(|(x, slopes)| (x.clone(), slopes.clone()))
+    }
+
+    /// Slopes that were simulated where it stands or, of a joint whose replays take two passes, within [`NEARBY`] of it in every coordinate. Where
+    /// a moment is fitted they are those of its own place only.
+    pub(super) fn slopes_nearby(&self) -> Option<Start> {
+        let takes_two = Passes::roughly(&self.fit.model).ok() == Some(Passes::First);
+        if !takes_two || self.fit.free.iter().any(Free::is_moment) {
+            return self.simulated_slopes();
+        }
+        let simulated = self.simulated.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = simulated.clone().or_else(|| self.begun.clone());
+        let is_near = |(x, _): &Start| (x - &self.x).amax() <= NEARBY * self.step;
+        found.filter(is_near).map(|(_, slopes)| (self.x.clone(), slopes))
     }
 
     /// `slopes` with the rows of the priors as they are weighed now.
@@ -169,6 +187,10 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
                 None => (self.slopes()?, 0),
             },
         };
+        if steps == 0 {
+            let here = (self.x.clone(), slopes.clone());
+            *self.simulated.lock().unwrap_or_else(PoisonError::into_inner) = Some(here);
+        }
         let place = Place { x: self.x.clone(), residuals, rows, slopes: slopes.clone(), steps };
         *self.stood.lock().unwrap_or_else(PoisonError::into_inner) = Some(place);
         Some(slopes)
@@ -214,7 +236,7 @@ impl Problem<'_> {
         let in_passes = |x: &DVector<f64>| Some(self.weighted(&self.residuals_at(x, passes)?, x));
         let here = match passes {
             Passes::All => self.weighted(self.current.as_ref()?, &self.x),
-            Passes::First => in_passes(&self.x)?,
+            Passes::First | Passes::Rough => in_passes(&self.x)?,
         };
         let columns: Option<Vec<DVector<f64>>> = (0..self.fit.free.len())
             .into_par_iter()
@@ -250,10 +272,18 @@ impl Problem<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
+    use bowden_model::channel::Channel;
     use nalgebra::{DMatrix, DVector};
 
-    use super::Place;
-    use crate::fit::objective::Residuals;
+    use super::{NEARBY, Place, Problem};
+    use crate::fit::free::Free;
+    use crate::fit::objective::{Objective, Residuals};
+    use crate::fit::solver::{FINE_STEP, Fit};
+    use crate::joint_model::JointModel;
+    use crate::progress::Quiet;
+    use crate::test_bench;
 
     /// Residuals `[x² - 4, 3 x + y]` at a place, with their slopes there.
     fn place(x: f64, y: f64) -> Place {
@@ -285,5 +315,42 @@ mod tests {
         );
         // The squares were promised to fall from 25 by 25 - (5 - 6 * 0.8)² - 2.4² = 19.2, and 26.9 are left.
         assert!(place(3.0, -9.0).slopes_after_step(&there, &DVector::from_vec(vec![4.6, -2.4])).is_none());
+    }
+
+    /// Of a motor with recorded duty, whose replays take two passes, and of a prescribed angle.
+    #[test]
+    fn slopes_of_a_place_nearby_stand_for_those_here_where_a_replay_takes_two_passes() {
+        let found_away = |duty: Option<f64>, steps: f64| {
+            let mut recording = test_bench::swung(1000);
+            if let Some(duty) = duty {
+                recording.set(Channel::Duty, vec![duty; 1000]);
+                recording.set(Channel::BusVoltage, vec![24.0; 1000]);
+            }
+            let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+            let free = ["pretension_n", "axial_stiffness_n"]
+                .map(|name| Free::nominal(&model, "tendon", name).unwrap())
+                .to_vec();
+            let objective = Objective::new(&model, &[recording], &[], false).unwrap();
+            let slopes = DMatrix::from_element(3, 2, 7.0);
+            let problem = Problem {
+                fit: &Fit { objective, model, free },
+                progress: &Quiet,
+                fixed: vec![false; 2],
+                step: FINE_STEP,
+                prior_weight: 1.0,
+                known: None,
+                x: DVector::from_vec(vec![0.3 + steps * FINE_STEP, 0.1]),
+                current: None,
+                begun: Some((DVector::from_vec(vec![0.3, 0.1]), slopes.clone())),
+                stood: Mutex::default(),
+                simulated: Mutex::default(),
+            };
+            let nearby = problem.slopes_nearby();
+            assert!(nearby.iter().all(|(x, found)| *x == problem.x && *found == slopes));
+            nearby.is_some()
+        };
+        assert!(found_away(Some(0.1), 0.0) && found_away(Some(0.1), -0.9 * NEARBY));
+        assert!(!found_away(Some(0.1), 1.1 * NEARBY));
+        assert!(found_away(None, 0.0) && !found_away(None, 0.9 * NEARBY));
     }
 }

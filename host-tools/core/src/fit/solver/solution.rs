@@ -56,7 +56,7 @@ pub(super) struct End {
     pub(super) fit: Fit,
     pub(super) fixed: Vec<bool>,
     pub(super) x: DVector<f64>,
-    /// Slopes at `x`, where the fit simulated them already.
+    /// Slopes at `x`, where the fit simulated them already, or nearby.
     pub(super) begun: Option<Start>,
     pub(super) prior_weight: f64,
 }
@@ -77,6 +77,7 @@ impl End {
             current: Some(Residuals { values }).filter(Residuals::is_finite),
             begun: begun.clone(),
             stood: Mutex::default(),
+            simulated: Mutex::default(),
         };
         problem.weigh_priors();
         let jacobian = problem.jacobian().unwrap_or_else(|| DMatrix::zeros(0, fit.free.len()));
