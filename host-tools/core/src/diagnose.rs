@@ -89,6 +89,8 @@ pub struct Diagnosed {
     pub findings: Findings,
     /// Motions that would part the named effects from those that could not be excluded.
     pub experiments: Vec<Experiment>,
+    /// What was not compared, one line for each recording that has such a part.
+    pub notes: Vec<String>,
     /// Every bench after its recordings.
     now: Vec<BenchNow>,
 }
@@ -583,7 +585,8 @@ impl Case<'_> {
             written_by: format!("bowden {}", env!("CARGO_PKG_VERSION")),
         };
         let regimes = regimes::regimes(judge, stages);
-        Ok(Diagnosed { findings: Findings { diagnosis, traces, regimes }, experiments, now })
+        let notes = self.judge.notes().map(str::to_owned).collect();
+        Ok(Diagnosed { findings: Findings { diagnosis, traces, regimes }, experiments, notes, now })
     }
 }
 

@@ -92,6 +92,7 @@ impl DiagnoseArguments {
             print(&format!("{}\n{}\n", diagnosis.summary, page.display()))?;
         }
         let mut outcome = outcome_of(study.recordings.iter().map(|listed| &listed.recording));
+        outcome.extend(&diagnosed.notes);
         if !diagnosis.complete {
             outcome.extend([
                 "stopped early: not every effect was tried; run it again to the end before trusting it",

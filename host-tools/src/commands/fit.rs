@@ -113,7 +113,9 @@ impl FitArguments {
         } else {
             print(&table(&result, &study))?;
         }
-        Ok(outcome_of(study.recordings.iter().map(|listed| &listed.recording)))
+        let mut outcome = outcome_of(study.recordings.iter().map(|listed| &listed.recording));
+        outcome.extend(&result.notes);
+        Ok(outcome)
     }
 
     /// Checks the output and reads the inputs.

@@ -193,3 +193,30 @@ fn a_replay_reads_nothing_but_time_and_inputs() {
     assert_eq!(a.lines().next(), Some(header));
     assert_eq!(a.lines().count(), 1 + recording.len());
 }
+
+/// A tenth of a second is lost at 1 s. Behind it 0.3 s have to pass, and the joint has to move.
+#[test]
+fn what_follows_a_gap_is_told_by_those_that_do_not_compare_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("rig.toml"), RIG).unwrap();
+    let simulate = ["simulate", "--rig", "rig.toml", "--out", "whole.csv", "--seconds", "4"];
+    assert_eq!(bowden(at, &simulate), (0, String::new(), String::new()));
+    let whole = fs::read_to_string(at.join("whole.csv")).unwrap();
+    let header = whole.lines().position(|line| line.starts_with("t_s")).unwrap();
+    let kept = whole.lines().enumerate().filter(|(line, _)| !(header + 1000..header + 1100).contains(line));
+    let lost: String = kept.flat_map(|(_, line)| [line, "\n"]).collect();
+    fs::write(at.join("lost.csv"), lost).unwrap();
+    let of_fit = ["fit", "lost.csv", "--rig", "rig.toml", "--out", "fitted.toml"];
+    let of_diagnosis = ["diagnose", "lost.csv", "--rig", "rig.toml", "--out", "found"];
+    for command in [of_fit, of_diagnosis] {
+        let (status, _, stderr) = bowden(at, &command);
+        let lines: Vec<&str> = stderr.lines().collect();
+        assert_eq!((status, lines.len()), (3, 2), "{stderr}");
+        assert!(lines[0].contains("a gap in t_s"), "{stderr}");
+        assert!(
+            lines[1].starts_with("bowden: lost.csv: ") && lines[1].contains(" follow gaps and are not"),
+            "{stderr}"
+        );
+    }
+}

@@ -266,6 +266,11 @@ impl Objective {
         &self.datasets[recording].blocks
     }
 
+    /// What is not compared of recordings because it follows gaps in them, one line each.
+    pub fn notes(&self) -> impl Iterator<Item = &str> {
+        self.datasets.iter().filter_map(|dataset| dataset.note.as_deref())
+    }
+
     /// Inputs of one recording.
     #[must_use]
     pub fn input(&self, recording: usize) -> &ReplayInput {

@@ -60,6 +60,8 @@ pub struct Recalibration {
     pub groups: Vec<Group>,
     /// Parameters on which the recordings say nothing.
     pub unseen: Vec<String>,
+    /// What was not compared, one line for each recording that has such a part.
+    pub notes: Vec<String>,
     /// Every bench as fitted.
     joints: Vec<JointModel>,
 }
@@ -163,6 +165,7 @@ pub fn recalibrate(study: &Study, progress: &dyn Progress) -> Result<Recalibrati
         channels,
         groups: sensitivity.groups(),
         unseen: sensitivity.unseen(),
+        notes: objective.notes().map(str::to_owned).collect(),
         joints: benches.iter().map(|bench| bench.apply(&solution.model)).collect(),
     })
 }

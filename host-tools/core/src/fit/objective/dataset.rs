@@ -56,6 +56,8 @@ pub(super) struct Dataset {
     flutter: Vec<Range<usize>>,
     /// Tensions that stood at the lower end of their amplifier.
     pub(super) cut_at_zero: Vec<Channel>,
+    /// What is not compared because it follows a gap, in one line.
+    pub(super) note: Option<String>,
     /// Whether nothing guides its replays but what its inputs name.
     runs_freely: bool,
     /// Of these inputs, outputs and blocks, of which only the use may change after the first replay.
@@ -205,9 +207,12 @@ impl Dataset {
                 has_travelled && t_s[sample] - t_s[behind] >= LEAD_IN_S
             })
         };
+        let mut behind_gaps_s = 0.0;
         while start < t_s.len() {
             if follows_gap(start) {
-                let Some(resumed) = resumes(start) else { break };
+                let resumed = resumes(start);
+                behind_gaps_s += t_s[resumed.unwrap_or(t_s.len() - 1)] - t_s[start];
+                let Some(resumed) = resumed else { break };
                 start = resumed;
             }
             let end = (start + 1).max(t_s.partition_point(|t| t - t_s[start] < BLOCK_S - 1e-9));
@@ -250,6 +255,14 @@ impl Dataset {
             blocks,
             flutter,
             cut_at_zero,
+            note: (behind_gaps_s > 0.0).then(|| {
+                format!(
+                    "{}: {behind_gaps_s:.2} of {:.2} s follow gaps and are not compared: what friction held there is not known until \
+                     {LEAD_IN_S} s have passed and the input has turned by {travel_rad:.4} rad",
+                    recording.source(),
+                    recording.duration_s()
+                )
+            }),
             runs_freely: false,
             memory: Memory::default(),
         })
