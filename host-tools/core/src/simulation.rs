@@ -48,13 +48,16 @@ pub enum Passes {
 }
 
 impl Passes {
+    /// Whether a replay of `model` takes two passes; not where the model cannot be driven.
+    #[must_use]
+    pub fn are_two(model: &JointModel) -> bool {
+        model.guided_by.is_none() && model.drive().is_ok_and(|drive| drive == Drive::GuidedMotor)
+    }
+
     /// What is enough to rank, and to set out by.
-    ///
-    /// # Errors
-    /// When the model cannot be driven.
-    pub fn roughly(model: &JointModel) -> Result<Self, Failure> {
-        let is_long = model.drive()? == Drive::GuidedMotor && model.guided_by.is_none();
-        Ok(if is_long { Self::First } else { Self::All })
+    #[must_use]
+    pub fn roughly(model: &JointModel) -> Self {
+        if Self::are_two(model) { Self::First } else { Self::All }
     }
 }
 

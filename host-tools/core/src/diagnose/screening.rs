@@ -127,7 +127,7 @@ pub fn screen(
         let seen = objective.residuals_in(passes, model).ok().filter(Residuals::is_finite)?;
         Some(&rows_now - rows(objective, &seen))
     };
-    let missing = (Passes::roughly(model).ok() == Some(Passes::First))
+    let missing = Passes::are_two(model)
         .then(|| Some(Missing { first: missing_in(Passes::First)?, rough: missing_in(Passes::Rough)? }))
         .flatten();
     let loss_now = now.norm_squared();

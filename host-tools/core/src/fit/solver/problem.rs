@@ -113,8 +113,7 @@ impl Problem<'_> {
     /// Slopes that were simulated where it stands or, of a joint whose replays take two passes, within [`NEARBY`] of it in every coordinate. Where
     /// a moment is fitted they are those of its own place only.
     pub(super) fn slopes_nearby(&self) -> Option<Start> {
-        let takes_two = Passes::roughly(&self.fit.model).ok() == Some(Passes::First);
-        if !takes_two || self.fit.free.iter().any(Free::is_moment) {
+        if !Passes::are_two(&self.fit.model) || self.fit.free.iter().any(Free::is_moment) {
             return self.simulated_slopes();
         }
         let simulated = self.simulated.lock().unwrap_or_else(PoisonError::into_inner);
@@ -232,7 +231,7 @@ impl Problem<'_> {
     /// Slopes of the weighted residuals.
     pub(super) fn slopes(&self) -> Option<DMatrix<f64>> {
         let is_fine = self.step < COARSE_STEP;
-        let passes = if is_fine { Passes::All } else { Passes::roughly(&self.fit.model).ok()? };
+        let passes = if is_fine { Passes::All } else { Passes::roughly(&self.fit.model) };
         let in_passes = |x: &DVector<f64>| Some(self.weighted(&self.residuals_at(x, passes)?, x));
         let here = match passes {
             Passes::All => self.weighted(self.current.as_ref()?, &self.x),
