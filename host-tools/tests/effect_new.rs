@@ -72,6 +72,7 @@ fn the_effect_does_what_the_law_did() {
         torque_nm: 0.0,
         coulomb_nm: 0.0,
         presliding_rad: 5e-4,
+        build_up: bowden_model::dry_friction::BuildUp::Linear,
         play_rad: 0.0,
     };
     oil.joint(&descriptor.defaults(), &mut [0.0; MAX_STATE], &mut port);

@@ -137,23 +137,3 @@ impl Response {
         self.kept * omega_rad_s + self.rad_s_per_nm * torque_nm
     }
 }
-
-/// Speed after dry friction acted for `dt_s`, in which a torque changes the speed by `rad_s_per_nm`; friction builds up to `level_nm` over a turn of
-/// `travel_rad` > 0 (Prandtl's element, solved with the speed at the end of the step). `presliding` is the part of the level that acts, -1 to 1.
-#[must_use]
-pub fn after_elastic_friction_rad_s(
-    presliding: &mut f64,
-    omega_rad_s: f64,
-    [level_nm, travel_rad]: [f64; 2],
-    rad_s_per_nm: f64,
-    dt_s: f64,
-) -> f64 {
-    if level_nm == 0.0 {
-        return omega_rad_s;
-    }
-    let loss = level_nm * rad_s_per_nm;
-    let per_speed = dt_s / travel_rad;
-    let sticking_rad_s = (omega_rad_s - loss * *presliding) * (1.0 + loss * per_speed).recip();
-    *presliding = (*presliding + per_speed * sticking_rad_s).clamp(-1.0, 1.0);
-    omega_rad_s - loss * *presliding
-}

@@ -5,6 +5,7 @@
 //! what it needs to. A hook that an effect leaves out does nothing; an effect that is not active costs nothing.
 
 use crate::channel::Channel;
+use crate::dry_friction::{BuildUp, DryFriction};
 use crate::friction_law::FrictionLaw;
 use crate::search::{Aftermath, Ordinary, Starts, is_weak};
 
@@ -76,6 +77,8 @@ pub struct ParameterSpec {
     pub searched: bool,
     /// Values that a search tries one by one, each as a hypothesis of its own; empty for all others.
     pub forms: &'static [f64],
+    /// Whether no other value than one of `forms` means anything. A search tries them once it has found the effect.
+    pub is_choice: bool,
     /// What is known of it before any recording, value and standard deviation; `None` for nothing.
     pub believed: Option<[f64; 2]>,
 }
@@ -100,6 +103,7 @@ impl ParameterSpec {
             meaning,
             searched: true,
             forms: &[],
+            is_choice: false,
             believed: None,
         }
     }
@@ -114,6 +118,19 @@ impl ParameterSpec {
         meaning: &'static str,
     ) -> Self {
         Self { scale: Scale::Log, ..Self::linear(name, unit, [lower, upper], default, meaning) }
+    }
+
+    /// Parameter that says which of two kinds is meant: 0, the default, or 1.
+    #[must_use]
+    pub const fn choice(name: &'static str, meaning: &'static str) -> Self {
+        let either = Self::linear(name, "1", [0.0, 1.0], 0.0, meaning).one_of(&[0.0, 1.0]);
+        Self { is_choice: true, ..either }
+    }
+
+    /// Whether a value within the bounds means anything.
+    #[must_use]
+    pub fn takes(&self, value: f64) -> bool {
+        !self.is_choice || self.forms.contains(&value)
     }
 
     /// The same parameter, left alone by a search for missing physics.
@@ -202,6 +219,12 @@ pub const PRESLIDING: ParameterSpec = ParameterSpec::log(
     "turn over which it builds up after a reversal",
 );
 
+/// How it does, as a parameter of dry friction: see [`BuildUp`].
+pub const PRESLIDING_EXPONENT: ParameterSpec = ParameterSpec::choice(
+    "presliding_exponent",
+    "exponent of Dahl's law by which it builds up: 0 in proportion to the turn, 1 ever more slowly",
+);
+
 /// Mechanical side of the motor, seen at the input pulley.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorPort {
@@ -226,10 +249,21 @@ pub struct MotorPort {
     pub coulomb_nm: f64,
     /// Turn over which dry friction builds up after a reversal, rad > 0.
     pub presliding_rad: f64,
+    /// How it does.
+    pub build_up: BuildUp,
     /// Play between rotor and input pulley, rad at the pulley.
     pub gear_play_rad: f64,
     /// Share of the viscous friction that acts behind that play, on the pulley, 0 to 1.
     pub drag_behind_play: f64,
+}
+
+impl MotorPort {
+    /// Its dry friction.
+    #[must_use]
+    #[inline]
+    pub const fn dry_friction(&self) -> DryFriction {
+        DryFriction { level_nm: self.coulomb_nm, travel_rad: self.presliding_rad, build_up: self.build_up }
+    }
 }
 
 /// Friction between tendon and sheath as it acts in one tendon for slip that starts at one end.
@@ -316,8 +350,19 @@ pub struct JointPort {
     pub coulomb_nm: f64,
     /// Turn over which dry friction builds up after a reversal, rad > 0.
     pub presliding_rad: f64,
+    /// How it does.
+    pub build_up: BuildUp,
     /// Play between output pulley and arm, rad.
     pub play_rad: f64,
+}
+
+impl JointPort {
+    /// Its dry friction.
+    #[must_use]
+    #[inline]
+    pub const fn dry_friction(&self) -> DryFriction {
+        DryFriction { level_nm: self.coulomb_nm, travel_rad: self.presliding_rad, build_up: self.build_up }
+    }
 }
 
 /// One sensor at a sampling instant.

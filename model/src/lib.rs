@@ -4,6 +4,7 @@
 
 pub mod channel;
 pub mod drive;
+pub mod dry_friction;
 pub mod effect;
 pub mod effect_set;
 pub mod effects;

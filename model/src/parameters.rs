@@ -156,6 +156,7 @@ macro_rules! nominal {
                 meaning: $meaning,
                 searched: true,
                 forms: &[],
+                is_choice: false,
                 believed: None,
             },
             get: |joint| joint.$section.map(|part| part.$name),

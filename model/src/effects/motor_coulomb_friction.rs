@@ -1,7 +1,9 @@
 //! Dry friction of motor and gear: a constant torque `τ_c` that opposes motion.
 
+use crate::dry_friction::BuildUp;
 use crate::effect::{
-    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING, ParameterSpec,
+    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING, PRESLIDING_EXPONENT,
+    ParameterSpec,
 };
 use crate::search::{Ordinary, OrdinaryUnit};
 
@@ -15,6 +17,7 @@ static DESCRIPTOR: Descriptor = Descriptor {
     parameters: &[
         ParameterSpec::linear("torque_nm", "N·m", [0.0, 20.0], 0.08, "friction torque at the input pulley"),
         PRESLIDING,
+        PRESLIDING_EXPONENT,
     ],
     neutral: Some(0.0),
     channels: &[],
@@ -37,5 +40,6 @@ impl Effect for MotorCoulombFriction {
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         port.coulomb_nm += p[0];
         port.presliding_rad = p[1];
+        port.build_up = BuildUp::of_exponent(p[2]);
     }
 }

@@ -5,7 +5,7 @@ use super::joint::Joint;
 use super::motor::{self, Motor};
 use super::spindle::Spindle;
 use super::step_input::Step;
-use crate::drive::{Response, after_elastic_friction_rad_s, pulley_inertia_kg_m2};
+use crate::drive::{Response, pulley_inertia_kg_m2};
 use crate::effect_set::EffectStates;
 use crate::load::{inertia_kg_m2, weight_nm};
 use crate::parameters::LoadParameters;
@@ -42,10 +42,8 @@ pub(super) fn step(
     let torque_nm = standing_nm + load_nm + input.input_torque_nm + port.torque_nm;
     let driven = response.after_rad_s(motor.omega_rad_s, torque_nm);
     let per_nm = response.rad_s_per_nm;
-    let friction = [port.coulomb_nm, port.presliding_rad];
-    let rubbed = after_elastic_friction_rad_s(&mut motor.presliding, driven, friction, per_nm, kick_s);
-    let friction = [at_joint.coulomb_nm, at_joint.presliding_rad];
-    let omega_rad_s = after_elastic_friction_rad_s(&mut joint.presliding, rubbed, friction, per_nm, kick_s);
+    let rubbed = port.dry_friction().after_rad_s(&mut motor.presliding, driven, per_nm, kick_s);
+    let omega_rad_s = at_joint.dry_friction().after_rad_s(&mut joint.presliding, rubbed, per_nm, kick_s);
     turn(motor, spindle, joint, [motor.theta_rad + dt_s * omega_rad_s, omega_rad_s]);
     motor.carry_current(parameters, &conduction);
 }

@@ -2,7 +2,8 @@
 
 use super::config::{OutputBoundary, PlantConfig};
 use super::step_input::Step;
-use crate::drive::{Response, after_elastic_friction_rad_s};
+use crate::drive::Response;
+use crate::dry_friction::{BuildUp, DryFriction};
 use crate::effect::{Component, JointPort, PRESLIDING_RAD};
 use crate::effect_set::EffectStates;
 use crate::load::{inertia_kg_m2, weight_nm};
@@ -50,6 +51,7 @@ impl Joint {
             torque_nm: 0.0,
             coulomb_nm: 0.0,
             presliding_rad: PRESLIDING_RAD,
+            build_up: BuildUp::Linear,
             play_rad: 0.0,
         };
         if step.config.effects.touches(Component::Joint) {
@@ -95,10 +97,9 @@ impl Joint {
             let inertia = inertia_kg_m2(&load, port.mass_kg);
             let weight_nm = weight_nm(&load, port.mass_kg, self.theta_rad);
             let response = Response::new(inertia, [load.viscous_nm_s_per_rad + loss, 0.0], kick_s);
-            self.omega_rad_s = after_elastic_friction_rad_s(
+            self.omega_rad_s = port.dry_friction().after_rad_s(
                 &mut self.presliding,
                 response.after_rad_s(before_rad_s, torque_nm + weight_nm),
-                [port.coulomb_nm, port.presliding_rad],
                 response.rad_s_per_nm,
                 kick_s,
             );
@@ -113,16 +114,14 @@ impl Joint {
             cables.close_play(parts);
             let before_rad = self.theta_rad;
             let drag_nm_per_rad = load.viscous_nm_s_per_rad / dt_s;
-            let friction = [port.coulomb_nm, port.presliding_rad];
-            self.balance(cables, parts, outside_nm, friction, drag_nm_per_rad);
+            self.balance(cables, parts, outside_nm, port.dry_friction(), drag_nm_per_rad);
             self.omega_rad_s = (self.theta_rad - before_rad) / dt_s;
         }
         cables.close_play(parts);
         self.play = cables.relax_play(parts, End::Output, Outside::NOTHING, self.play, port.play_rad);
     }
 
-    /// Turns a joint without inertia until the cables balance load and friction: dry friction of `level_nm` that builds up over
-    /// `travel_rad`, and `drag_nm_per_rad` for the turn taken.
+    /// Turns a joint without inertia until the cables balance load and friction: dry friction, and `drag_nm_per_rad` for the turn taken.
     ///
     /// Newton steps on the torque. Along a turn the cables only soften, so that the slope of the last turn falls short
     /// rather than beyond; a turn that begins takes the slope of cables that stick everywhere, because the one from
@@ -132,7 +131,7 @@ impl Joint {
         cables: &mut Transmission,
         parts: &TransmissionConfig,
         outside_nm: f64,
-        [level_nm, travel_rad]: [f64; 2],
+        friction: DryFriction,
         drag_nm_per_rad: f64,
     ) {
         /// Newton steps at most; what is left then is taken up by the next simulation step.
@@ -145,14 +144,12 @@ impl Joint {
         let before = self.presliding;
         let (mut turned_rad, mut last_rad) = (0.0, 0.0);
         for _ in 0..STEPS {
-            let rubbing = before + turned_rad / travel_rad;
-            self.presliding = rubbing.clamp(-1.0, 1.0);
+            self.presliding = friction.acting(before, turned_rad);
             let torque_nm = cables.torque_out_nm(parts) + outside_nm - drag_nm_per_rad * turned_rad;
-            let excess_nm = torque_nm - level_nm * self.presliding;
+            let excess_nm = torque_nm - friction.level_nm * self.presliding;
             let goes_on = excess_nm * last_rad > 0.0;
             let stiffness = if goes_on { cables.stiffness_nm_per_rad(parts, End::Output) } else { sticking };
-            let slides = rubbing.copysign(rubbing * excess_nm) >= 1.0;
-            let rubbing_nm_per_rad = if slides { 0.0 } else { level_nm / travel_rad };
+            let rubbing_nm_per_rad = friction.stiffness_nm_per_rad(before, turned_rad, excess_nm);
             let slope = stiffness + rubbing_nm_per_rad + drag_nm_per_rad;
             let delta_rad = (excess_nm / slope).clamp(-LONGEST_RAD, LONGEST_RAD);
             last_rad = delta_rad;

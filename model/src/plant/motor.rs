@@ -1,9 +1,8 @@
 //! Stage 1, bridge to rotor: the current of the winding, and the speed that its torque gives the rotor.
 
 use super::step_input::Step;
-use crate::drive::{
-    Conduction, Response, after_elastic_friction_rad_s, pulley_inertia_kg_m2, pulley_torque_constant_nm_per_a,
-};
+use crate::drive::{Conduction, Response, pulley_inertia_kg_m2, pulley_torque_constant_nm_per_a};
+use crate::dry_friction::BuildUp;
 use crate::effect::{Component, MotorPort, PRESLIDING_RAD};
 use crate::effect_set::EffectStates;
 use crate::parameters::MotorParameters;
@@ -99,10 +98,9 @@ impl Motor {
         let drag = dragged * motor.viscous_nm_s_per_rad + load.drag_nm_s_per_rad;
         let response = Response::new(pulley_inertia_kg_m2(motor), [drag, back_emf_drag], step.kick_s);
         let torque_nm = motor_nm + load.cables_nm + load.outside_nm + port.torque_nm;
-        self.omega_rad_s = after_elastic_friction_rad_s(
+        self.omega_rad_s = port.dry_friction().after_rad_s(
             &mut self.presliding,
             response.after_rad_s(self.omega_rad_s, torque_nm),
-            [port.coulomb_nm, port.presliding_rad],
             response.rad_s_per_nm,
             step.kick_s,
         );
@@ -163,6 +161,7 @@ pub(super) fn port(
         torque_nm: 0.0,
         coulomb_nm: 0.0,
         presliding_rad: PRESLIDING_RAD,
+        build_up: BuildUp::Linear,
         gear_play_rad: 0.0,
         drag_behind_play: 0.0,
     };

@@ -3,7 +3,8 @@
 use crate::joint::{IDLE, RADIUS_M, Run, STIFFNESS_N_PER_M, joint};
 use crate::motor::{MOTOR, PULLEY_INERTIA_KG_M2, PULLEY_NM_PER_A};
 use crate::near::near;
-use bowden_model::drive::{BridgeInput, after_elastic_friction_rad_s};
+use bowden_model::drive::BridgeInput;
+use bowden_model::dry_friction::{BuildUp, DryFriction};
 use bowden_model::effect::{ActiveEffect, PRESLIDING_RAD};
 use bowden_model::effects::find;
 use bowden_model::parameters::{JointParameters, MotorParameters};
@@ -78,22 +79,19 @@ fn standstill_below_breakaway() {
 }
 
 /// A motor that slides to and fro is held back by all of its friction but for the turns over which that builds up again:
-/// from full friction one way to full friction the other, the work of a stroke of length A is τ (A - 2 s).
+/// from full friction one way to full friction the other, the work of a stroke of length A is τ (A - 2 s) for both kinds, since
+/// ∫ 2 e^{-x/s} dx is 2 s too.
 #[test]
 fn presliding_takes_its_turn_from_the_work_of_a_stroke() {
-    for travel_rad in [1e-4, 5e-3] {
+    let kinds = [BuildUp::Linear, BuildUp::Exponential];
+    for (travel_rad, build_up) in [1e-4, 5e-3].into_iter().flat_map(|s| kinds.map(|kind| (s, kind))) {
         let mut presliding = -1.0;
         let (step_rad, level_nm) = (1e-5, 0.08);
         let mut work_j = 0.0;
         for _ in 0..4000 {
             // Inertia so large that the speed is what it is.
-            let speed_rad_s = after_elastic_friction_rad_s(
-                &mut presliding,
-                step_rad / 1e-3,
-                [level_nm, travel_rad],
-                1e-12,
-                1e-3,
-            );
+            let friction = DryFriction { level_nm, travel_rad, build_up };
+            let speed_rad_s = friction.after_rad_s(&mut presliding, step_rad / 1e-3, 1e-12, 1e-3);
             near("speed", speed_rad_s, step_rad / 1e-3, 1e-9);
             work_j += level_nm * presliding * step_rad;
         }

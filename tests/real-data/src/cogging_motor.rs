@@ -240,6 +240,7 @@ fn terms(physics: Physics, harmonics: &[u32], motion: (&[f64], &[f64], &[f64]), 
                     torque_nm: 0.0,
                     coulomb_nm: 0.0,
                     presliding_rad: bowden_model::effect::PRESLIDING_RAD,
+                    build_up: bowden_model::dry_friction::BuildUp::Linear,
                     gear_play_rad: 0.0,
                     drag_behind_play: 0.0,
                 };

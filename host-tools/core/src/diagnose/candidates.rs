@@ -67,9 +67,9 @@ pub fn candidates(
     found
 }
 
-/// The effect once for each form that one of its parameters may have.
+/// The effect once for each form that one of its parameters may have, but for those that are tried once it is found.
 fn forms(base: ActiveEffect) -> Vec<ActiveEffect> {
-    let formed = base.descriptor().parameters.iter().find(|spec| !spec.forms.is_empty());
+    let formed = base.descriptor().parameters.iter().find(|spec| !spec.forms.is_empty() && !spec.is_choice);
     formed.map_or_else(
         || vec![base],
         |spec| spec.forms.iter().map(|form| base.with(spec.name, *form)).collect(),

@@ -9,6 +9,7 @@
 
 mod across;
 mod begin_again;
+mod build_up;
 mod exchange;
 mod hypotheses;
 mod laws;
@@ -117,6 +118,14 @@ impl Chosen {
             model.effects.iter_mut().filter(|one| one.is_beside(&self.effect)).for_each(|one| *one = other);
         }
         self.effect = other;
+    }
+
+    /// The same effect in another kind, as `with` has it last; its rivals keep their losses.
+    fn takes_kind(&mut self, with: &Fitted) {
+        self.effect = with.newest();
+        self.model = with.without_ordinary();
+        self.loss_after = with.loss;
+        self.compared[1] = with.solution.model.clone();
     }
 
     /// Odds of a rival against this effect. Effects of the catalogue have higher prior odds than laws ([`handicap`]).
@@ -463,7 +472,8 @@ fn handicap(effect: &ActiveEffect) -> f64 {
     let parameters = effect.descriptor().parameters;
     let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
     let is_unusual = law::of(effect).is_some() || parameters.iter().zip(effect.parameters).any(unusual);
-    POLICY.handicap(parameters.len(), !is_unusual)
+    let fitted = parameters.iter().filter(|spec| !spec.is_choice).count();
+    POLICY.handicap(fitted, !is_unusual)
 }
 
 /// Whether a fitted effect is negligible: too weak, within the tolerances of an ordinary bench, or active over too little travel.

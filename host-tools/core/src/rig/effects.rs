@@ -103,6 +103,13 @@ fn read_entry(
     for (value, spec) in parameters.iter_mut().zip(descriptor.parameters) {
         let bounds = Bounds { lower: spec.lower, upper: spec.upper, unit: spec.unit };
         if let Some(given) = section.number(spec.name, bounds)? {
+            if !spec.takes(given) {
+                let span = section.get(spec.name).map_or(section.span.clone(), Located::span);
+                let key = section.path(spec.name);
+                return Err(section
+                    .source
+                    .at(&span, format!("{key}: got {given}, expected 0 or 1; correct it")));
+            }
             *value = given;
         }
     }

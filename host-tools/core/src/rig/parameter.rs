@@ -199,6 +199,11 @@ impl RigParameter {
                 "{self}: got {value}, allowed {lower} to {upper}{unit}; check value and unit"
             ));
         }
+        if let Self::Effect { descriptor, index } = self
+            && !descriptor.parameters[*index].takes(value)
+        {
+            return Err(format!("{self}: got {value}, expected 0 or 1"));
+        }
         if self.get(rig).is_none() {
             let (lacking, advice) = match self {
                 Self::Nominal(parameter) => {

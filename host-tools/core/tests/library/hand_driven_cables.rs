@@ -155,6 +155,7 @@ fn gear_friction_grows_with_the_given_power_of_the_torque_carried() {
             torque_nm: 0.0,
             coulomb_nm: 0.1,
             presliding_rad: bowden_model::effect::PRESLIDING_RAD,
+            build_up: bowden_model::dry_friction::BuildUp::Linear,
             gear_play_rad: 0.0,
             drag_behind_play: 0.0,
         };

@@ -1,7 +1,7 @@
 //! A rig file that is changed keeps its comments, and what is written reads back as the rig that was meant.
 
 use bowden_core::outcome::FailureClass;
-use bowden_core::rig::{ProportionalLaw, Rig, RigDocument};
+use bowden_core::rig::{ProportionalLaw, Rig, RigDocument, RigParameter};
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, Target};
 use bowden_model::effects::{CATALOGUE, find};
@@ -230,4 +230,22 @@ fn values_that_no_rig_file_may_hold_are_not_written() {
         assert_eq!(failure.class(), FailureClass::Failed);
     }
     assert_eq!(document.to_string(), RIG);
+}
+
+/// How dry friction builds up has two kinds and nothing between them, in a file as for `--set`.
+#[test]
+fn a_kind_is_one_of_those_that_there_are() {
+    let mut document = document();
+    document.add_effect(&with("joint_coulomb_friction", "presliding_exponent", 1.0, Target::None)).unwrap();
+    let mut rig = document.rig().unwrap();
+    let between = document.to_string().replace("presliding_exponent = 1.0", "presliding_exponent = 0.5");
+    let failure = Rig::parse(&between, "rig.toml").unwrap_err();
+    let line = between.lines().position(|line| line.starts_with("presliding_exponent")).unwrap() + 1;
+    let reason = "effects.joint_coulomb_friction.presliding_exponent: got 0.5, expected 0 or 1; correct it";
+    assert_eq!(failure.message(), format!("rig.toml:{line}:23: {reason}"));
+
+    let kind = RigParameter::parse("effects.joint_coulomb_friction.presliding_exponent").unwrap();
+    assert!(kind.set(&mut rig, 0.5).unwrap_err().ends_with("got 0.5, expected 0 or 1"));
+    kind.set(&mut rig, 0.0).unwrap();
+    assert_eq!(rig.effects[0].parameters[2], 0.0);
 }

@@ -48,6 +48,7 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
         worth: Worth,
     ) -> Result<(), Failure> {
+        self.choose_kind(now)?;
         while now.names() < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(&now.fit)?;
             let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
@@ -57,6 +58,7 @@ impl Search<'_> {
             };
             now.chosen.push(found);
             now.fit = with;
+            self.choose_kind(now)?;
             self.add_instances(now)?;
         }
         self.exchange(now)?;

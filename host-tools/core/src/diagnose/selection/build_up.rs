@@ -1,0 +1,104 @@
+//! Which kind of a named effect the recordings show: dry friction that builds up in proportion to the turn after a reversal, for example, or
+//! ever more slowly.
+//!
+//! The other kind is tried as soon as the effect is found, because what the wrong one leaves has the form of yet another effect: at the rests
+//! of a staircase that of a weight that was changed.
+
+use super::{Explanation, PATIENCE, Search, handicap};
+use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
+use crate::outcome::Failure;
+
+impl Search<'_> {
+    /// Replaces the kind of the effect that was found last by the likeliest one.
+    pub(super) fn choose_kind(&self, now: &mut Explanation) -> Result<(), Failure> {
+        let Explanation { fit: present, chosen } = now;
+        let Some(newest) = chosen.last_mut() else { return Ok(()) };
+        let place = present.newest_place();
+        let found = present.newest();
+        let Some(spec) = found.descriptor().parameters.iter().find(|spec| spec.is_choice) else {
+            return Ok(());
+        };
+        let others = spec.forms.iter().map(|form| found.with(spec.name, *form));
+        for other in others.filter(|other| other.parameters != found.parameters) {
+            if self.progress.interrupted() {
+                return Ok(());
+            }
+            let mut model = present.solution.model.clone();
+            model.effects[place] = other;
+            let likelier = |loss: f64, others_loss: f64| {
+                handicap(&other) * others_loss < handicap(&present.newest()) * loss
+            };
+            // With the slopes of the other kind, in a third of the simulations.
+            let slopes = present.solution.slopes();
+            let known = Known { jacobian: Some(&slopes.jacobian), spread: slopes.spread };
+            let free = present.layout.free(self.believed, &model);
+            let ranked = solve_for_ranking(self.objective, &model, &free, PATIENCE, &known)?;
+            let ranked = self.judged(present.layout.clone(), ranked, false);
+            if !likelier(present.loss, ranked.loss) {
+                continue;
+            }
+            let with = self.fit(present.layout.clone(), &ranked.solution.model, &[FINE_STEP, FINE_STEP])?;
+            if likelier(present.loss, with.loss) && self.holds_across_recordings(present, &with, likelier)? {
+                newest.takes_kind(&with);
+                *present = with;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::effect::ActiveEffect;
+    use bowden_model::effects::find;
+
+    use super::super::{Asked, Chosen, Explanation, Search};
+    use crate::diagnose::layout::Layout;
+    use crate::fit::objective::Objective;
+    use crate::fit::solver::{COARSE_STEP, FINE_STEP};
+    use crate::joint_model::JointModel;
+    use crate::progress::Quiet;
+    use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
+
+    /// Friction of the joint that builds up over 4 mrad with this exponent.
+    fn friction(exponent: f64) -> ActiveEffect {
+        let effect = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap());
+        effect.with("torque_nm", 0.3).with("presliding_rad", 4e-3).with("presliding_exponent", exponent)
+    }
+
+    /// Found as a spring up to its level, it becomes what it is, with the turn over which it builds up; and a spring stays one.
+    #[test]
+    fn dry_friction_becomes_the_kind_that_the_recording_shows() {
+        for exponent in [0.0, 1.0] {
+            let mut recording = test_bench::swung(6000);
+            let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+            let real = JointModel { effects: vec![friction(exponent)], ..model.clone() };
+            let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+            for (channel, values) in measured.channels() {
+                recording.set(channel, values.to_vec());
+            }
+            let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+            let asked = Asked::default();
+            let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
+            let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP]).unwrap();
+            let (layout, with) = nothing.layout.with(&model, friction(0.0));
+            let fit = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+            let found_loss = fit.loss;
+            let chosen = vec![Chosen::newest_of(&fit, &nothing, Vec::new())];
+            let mut now = Explanation { fit, chosen };
+            search.choose_kind(&mut now).unwrap();
+
+            let [one] = &now.chosen[..] else { panic!("{}", now.chosen.len()) };
+            let [torque_nm, presliding_rad, kind, ..] = one.effect.parameters;
+            assert_eq!((kind, now.fit.newest(), one.loss_after), (exponent, one.effect, now.fit.loss));
+            assert!((torque_nm / 0.3 - 1.0).abs() < 0.05, "exponent {exponent}: {torque_nm} N·m");
+            assert!((presliding_rad / 4e-3 - 1.0).abs() < 0.2, "exponent {exponent}: {presliding_rad} rad");
+            if exponent == 0.0 {
+                assert_eq!(now.fit.loss, found_loss);
+            } else {
+                assert!(now.fit.loss < 0.5 * found_loss, "{found_loss} to {}", now.fit.loss);
+            }
+        }
+    }
+}
