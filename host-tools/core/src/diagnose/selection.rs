@@ -9,9 +9,9 @@
 
 mod across;
 mod begin_again;
-mod build_up;
 mod exchange;
 mod hypotheses;
+mod kinds;
 mod laws;
 mod loudest;
 mod names;

@@ -1,5 +1,6 @@
 //! What explains the difference: effects, recalibrated parameters, what cannot be told apart, what is left.
 
+use bowden_model::effects::find;
 use maud::{Markup, html};
 
 use crate::diagnose::verdict::{Diagnosis, Findings, NamedEffect};
@@ -67,7 +68,10 @@ pub fn card(effect: &NamedEffect) -> Markup {
                     tbody { @for (name, estimate) in &effect.parameters { tr {
                         th scope="row" { code { (name) } }
                         td { (figures::estimate(estimate.value, estimate.std, &estimate.unit)) }
-                        td { (remark(estimate.at_bound, estimate.std)) }
+                        td { @match values_tried(&effect.id, name) {
+                            Some(values) => { "best of " (values) ", not fitted" }
+                            None => { (remark(estimate.at_bound, estimate.std)) }
+                        } }
                     } } }
                 }
             }
@@ -81,6 +85,13 @@ pub fn card(effect: &NamedEffect) -> Markup {
             }
         }
     }
+}
+
+/// Values of a parameter that a search tries one by one; `None` for a parameter that it fits.
+fn values_tried(effect: &str, parameter: &str) -> Option<String> {
+    let spec = find(effect)?.descriptor().parameters.iter().find(|spec| spec.name == parameter)?;
+    let values: Vec<String> = spec.forms.iter().map(f64::to_string).collect();
+    (!values.is_empty()).then(|| values.join(" and "))
 }
 
 /// Parameters of an effect that the part has several times, strongest first.

@@ -1,6 +1,7 @@
 //! The page as a whole: order, completeness, safety, size.
 
 use super::{example, render};
+use crate::diagnose::verdict::Estimate;
 
 /// Page without tags and with plain spaces: what a reader sees.
 fn text_of(page: &str) -> String {
@@ -69,6 +70,16 @@ fn every_finding_is_shown() {
     ] {
         assert!(text.contains(expected), "{expected:?} is missing");
     }
+}
+
+/// Which of two kinds an effect is has no deviation; the table says what it was chosen from.
+#[test]
+fn a_parameter_that_is_not_fitted_says_which_values_were_tried() {
+    let mut findings = example::findings(500);
+    let kind = Estimate { value: 1.0, std: None, unit: "1".into(), at_bound: false };
+    findings.diagnosis.effects[1].parameters.insert("presliding_exponent".into(), kind);
+    let text = text_of(&render(&findings));
+    assert!(text.contains("presliding_exponent1.00best of 0 and 1, not fitted"));
 }
 
 /// An effect that a part has several times stands in one table, a row each.
