@@ -49,7 +49,7 @@ impl DryFriction {
         let turns = turned_rad / self.travel_rad;
         match self.build_up {
             BuildUp::Linear => (before + turns).clamp(-1.0, 1.0),
-            BuildUp::Exponential => (before + turns) / (1.0 + turns.abs()),
+            BuildUp::Exponential => exponential(before, turns),
         }
     }
 
@@ -97,10 +97,15 @@ impl DryFriction {
                 let root = sqrt(b * b + 4.0 * per_speed * c);
                 let speed_rad_s = if b > 0.0 { 2.0 * c / (b + root) } else { (root - b) / (2.0 * per_speed) };
                 let after_rad_s = speed_rad_s.copysign(left_rad_s);
-                let turns = per_speed * after_rad_s;
-                *acting = (*acting + turns) / (1.0 + turns.abs());
+                *acting = exponential(*acting, per_speed * after_rad_s);
                 after_rad_s
             }
         }
     }
+}
+
+/// Part of the level that acts so many turns after `before` did, with `i = 1` and the turn taken implicitly.
+#[inline]
+fn exponential(before: f64, turns: f64) -> f64 {
+    (before + turns) / (1.0 + turns.abs())
 }

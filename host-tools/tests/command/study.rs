@@ -184,6 +184,11 @@ fn unusable_studies_are_refused_in_one_line() {
         (format!("{bench}{recording}heldout = true\n"), 2, "bench `one` has no recording to learn from"),
         (format!("{bench}own = [\"load.mas_kg\"]\n{recording}"), 5, "did you mean `load.mass_kg`?"),
         (format!("{bench}own = [\"controller.delay_s\"]\n{recording}"), 5, "cannot be fitted"),
+        (
+            format!("{bench}own = [\"effects.motor_coulomb_friction.presliding_exponent\"]\n{recording}"),
+            5,
+            "cannot be fitted",
+        ),
         (format!("{bench}{recording}set = {{ \"load.mas_kg\" = 2 }}\n"), 7, "did you mean `load.mass_kg`?"),
         (format!("{bench}{recording}set = {{ \"load.mass_kg\" = -2 }}\n"), 7, "allowed 0 to 1000 kg"),
         (format!("{bench}{recording}set = {{ \"load.mass_kg\" = \"heavy\" }}\n"), 7, "expected a number"),

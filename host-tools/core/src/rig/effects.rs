@@ -8,6 +8,7 @@ use bowden_model::effect::{ActiveEffect, Descriptor, Effect, Target};
 use bowden_model::effects::{CATALOGUE, find};
 use toml::de::DeValue;
 
+use super::parameter::refused;
 use super::section::{Bounds, Located, Section, advice};
 use crate::outcome::Failure;
 
@@ -103,12 +104,10 @@ fn read_entry(
     for (value, spec) in parameters.iter_mut().zip(descriptor.parameters) {
         let bounds = Bounds { lower: spec.lower, upper: spec.upper, unit: spec.unit };
         if let Some(given) = section.number(spec.name, bounds)? {
-            if !spec.takes(given) {
+            if let Some(reason) = refused(spec, given) {
                 let span = section.get(spec.name).map_or(section.span.clone(), Located::span);
                 let key = section.path(spec.name);
-                return Err(section
-                    .source
-                    .at(&span, format!("{key}: got {given}, expected 0 or 1; correct it")));
+                return Err(section.source.at(&span, format!("{key}: {reason}; correct it")));
             }
             *value = given;
         }

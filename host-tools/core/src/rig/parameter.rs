@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use bowden_model::effect::{ActiveEffect, Descriptor};
+use bowden_model::effect::{ActiveEffect, Descriptor, ParameterSpec};
 use bowden_model::effects::{CATALOGUE, find};
 use bowden_model::parameters::{JointParameters, NOMINAL_PARAMETERS, NominalParameter, nominal};
 
@@ -113,6 +113,16 @@ impl RigParameter {
         matches!(self, Self::Effect { .. })
     }
 
+    /// Whether a fit may move it: no parameter of the position loop, and none that says which of two kinds is meant.
+    #[must_use]
+    pub const fn can_be_fitted(&self) -> bool {
+        match self {
+            Self::Nominal(_) => true,
+            Self::Effect { descriptor, index } => !descriptor.parameters[*index].is_choice,
+            Self::Controller(_) => false,
+        }
+    }
+
     /// Smallest and largest accepted value, and unit.
     #[must_use]
     pub fn range(&self) -> (f64, f64, &'static str) {
@@ -200,9 +210,9 @@ impl RigParameter {
             ));
         }
         if let Self::Effect { descriptor, index } = self
-            && !descriptor.parameters[*index].takes(value)
+            && let Some(reason) = refused(&descriptor.parameters[*index], value)
         {
-            return Err(format!("{self}: got {value}, expected 0 or 1"));
+            return Err(format!("{self}: {reason}"));
         }
         if self.get(rig).is_none() {
             let (lacking, advice) = match self {
@@ -283,6 +293,12 @@ impl PartialEq for RigParameter {
             _ => false,
         }
     }
+}
+
+/// Why a value within the bounds of a parameter means nothing.
+pub(super) fn refused(spec: &ParameterSpec, value: f64) -> Option<String> {
+    let kinds: Vec<String> = spec.forms.iter().map(f64::to_string).collect();
+    (!spec.takes(value)).then(|| format!("got {value}, expected {}", kinds.join(" or ")))
 }
 
 #[cfg(test)]

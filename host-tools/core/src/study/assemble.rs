@@ -36,7 +36,7 @@ impl LoadedStudy {
         }
         let rig = document.rig()?;
         for parameter in &own {
-            if matches!(parameter, RigParameter::Controller(_)) {
+            if !parameter.can_be_fitted() {
                 return Err(Failure::bad_input(format!(
                     "bench `{name}`: `{parameter}` cannot be fitted; state it under `set` of the recordings"
                 )));
@@ -97,6 +97,11 @@ mod tests {
             ("left", Vec::new(), "bench `left`: there is one already"),
             ("a/b", Vec::new(), "bench `a/b`: the name becomes part"),
             ("right", own("motor.supply_v"), "bench `right`: its rig has no `motor.supply_v`"),
+            (
+                "right",
+                own("effects.joint_coulomb_friction.presliding_exponent"),
+                "bench `right`: `effects.joint_coulomb_friction.presliding_exponent` cannot be fitted",
+            ),
             ("right", own("controller.delay_s"), "bench `right`: `controller.delay_s` cannot be fitted"),
         ] {
             let failure = study.add_bench(name, document.clone(), own).unwrap_err();

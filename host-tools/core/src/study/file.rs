@@ -124,7 +124,7 @@ fn read_bench(section: &Section, folder: &Path) -> Result<ListedBench, Failure> 
     let mut own: Vec<(RigParameter, String)> = Vec::new();
     for (path, span) in section.strings("own")?.unwrap_or_default() {
         let parameter = RigParameter::parse(path).map_err(|reason| section.source.at(&span, reason))?;
-        if matches!(parameter, RigParameter::Controller(_)) {
+        if !parameter.can_be_fitted() {
             let reason = format!("`{path}` cannot be fitted; state it under `set` of the recordings");
             return Err(section.source.at(&span, reason));
         }

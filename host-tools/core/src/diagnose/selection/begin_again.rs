@@ -49,6 +49,7 @@ impl Search<'_> {
             others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
             let chosen = vec![Chosen::newest_of(&fit, nothing, others)];
             let mut other = Explanation { fit, chosen };
+            self.choose_kind(&mut other)?;
             self.add_names(&mut other, rounds, Policy::worth_naming)?;
             if best.as_ref().is_none_or(|best| other.fit.loss < best.fit.loss) {
                 best = Some(other);

@@ -52,7 +52,7 @@ mod tests {
     use bowden_model::effect::ActiveEffect;
     use bowden_model::effects::find;
 
-    use super::super::{Asked, Chosen, Explanation, Search};
+    use super::super::{Asked, Chosen, Explanation, Policy, Search};
     use crate::diagnose::layout::Layout;
     use crate::fit::objective::Objective;
     use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -88,6 +88,14 @@ mod tests {
             let chosen = vec![Chosen::newest_of(&fit, &nothing, Vec::new())];
             let mut now = Explanation { fit, chosen };
             search.choose_kind(&mut now).unwrap();
+
+            let named = {
+                let mut named = Explanation { fit: nothing.clone(), chosen: Vec::new() };
+                search.add_names(&mut named, &mut Vec::new(), Policy::worth_naming).unwrap();
+                named.chosen
+            };
+            let friction = named.iter().find(|one| one.effect.is_beside(&friction(0.0))).expect("friction");
+            assert_eq!(friction.effect.parameters[2], exponent, "as the search names it");
 
             let [one] = &now.chosen[..] else { panic!("{}", now.chosen.len()) };
             let [torque_nm, presliding_rad, kind, ..] = one.effect.parameters;

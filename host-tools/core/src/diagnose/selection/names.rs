@@ -48,7 +48,6 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
         worth: Worth,
     ) -> Result<(), Failure> {
-        self.choose_kind(now)?;
         while now.names() < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(&now.fit)?;
             let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;

@@ -189,6 +189,10 @@ fn a_form_that_is_not_the_usual_one_has_to_be_worth_its_choice() {
     for (left, square_wins) in [(0.86, false), (0.84, true)] {
         assert_eq!(left * handicap(&square) < handicap(&gear), square_wins, "{left}");
     }
+    // Which of two kinds it is counts as that choice, and as no third parameter.
+    let dry = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap());
+    assert!((handicap(&dry) - 1.06).abs() < 1e-12, "{}", handicap(&dry));
+    assert!((handicap(&dry.with("presliding_exponent", 1.0)) - 1.06 / 0.85).abs() < 1e-12);
 }
 
 /// A reading at its limit in one second of ten, beside what takes 3.5 in each: of 6.65 it takes 3.65 off, of the 3.5 elsewhere 0.45. A law
