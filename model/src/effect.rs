@@ -547,6 +547,9 @@ pub struct ActiveEffect {
     pub parameters: [f64; MAX_PARAMETERS],
     /// Sensor channels it applies to.
     pub target: Target,
+    /// The one bench that has it, where several are described together; `None` if all have it. A simulation is of one joint and does not
+    /// ask.
+    pub bench: Option<u16>,
 }
 
 impl ActiveEffect {
@@ -558,7 +561,7 @@ impl ActiveEffect {
             [] => Target::None,
             [one, ..] => Target::One(*one),
         };
-        Self { effect, parameters: descriptor.defaults(), target }
+        Self { effect, parameters: descriptor.defaults(), target, bench: None }
     }
 
     /// Declaration of the effect.
@@ -570,7 +573,19 @@ impl ActiveEffect {
     /// Whether both are instances of one effect on one part.
     #[must_use]
     pub fn is_beside(&self, other: &Self) -> bool {
+        self.is_alike(other) && self.bench.is_none_or(|bench| other.is_on(bench))
+    }
+
+    /// The same of the parts of any bench.
+    #[must_use]
+    pub fn is_alike(&self, other: &Self) -> bool {
         self.descriptor().id == other.descriptor().id && self.target.overlaps(other.target)
+    }
+
+    /// Whether a bench has it.
+    #[must_use]
+    pub fn is_on(&self, bench: u16) -> bool {
+        self.bench.is_none_or(|one| one == bench)
     }
 
     /// Whether a simulation cannot have both: instances of one effect on one part that do not differ where they should.
@@ -603,6 +618,7 @@ impl core::fmt::Debug for ActiveEffect {
             .field("id", &self.descriptor().id)
             .field("parameters", &&self.parameters[..self.descriptor().parameters.len()])
             .field("target", &self.target)
+            .field("bench", &self.bench)
             .finish_non_exhaustive()
     }
 }
@@ -612,5 +628,6 @@ impl PartialEq for ActiveEffect {
         self.descriptor().id == other.descriptor().id
             && self.parameters == other.parameters
             && self.target == other.target
+            && self.bench == other.bench
     }
 }

@@ -254,13 +254,14 @@ impl Case<'_> {
             (selected, last) = unfaded(selected)?;
         }
         let recalibrated = Stage::of(judge, &at_full_resolution(&selected.baseline.model, model))?;
-        if selected.complete
-            && !selected.chosen.is_empty()
-            && !POLICY.pays(
-                recalibrated.loss(judge, Part::Training),
-                objective.mean_loss(&last.residuals, Part::Training),
+        let pays = |bench: Option<u16>| {
+            POLICY.pays(
+                judge.mean_loss_on(bench, &recalibrated.residuals, Part::Training),
+                objective.mean_loss_on(bench, &last.residuals, Part::Training),
             )
-        {
+        };
+        let pays_anywhere = pays(None) || selected.chosen.iter().any(|one| pays(one.effect.bench));
+        if selected.complete && !selected.chosen.is_empty() && !pays_anywhere {
             selected = selected.withdrawn();
             last = refined(&selected.model)?;
         }
@@ -386,7 +387,7 @@ impl Case<'_> {
         let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
         let of_bench: Vec<&Recalibrated> = recalibrated.iter().filter(|one| one.is_of(&bench.name)).collect();
         let undecided =
-            off_centre::undecided(self.objective, &of_bench, &diagnosed.effects, &bench.rig.undecided);
+            off_centre::undecided(self.objective, &of_bench, &joint.effects, &bench.rig.undecided);
         BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted, undecided }
     }
 
@@ -399,14 +400,33 @@ impl Case<'_> {
         Ok(found.into_iter().map(|hum| (hum, hum.heldout(self.judge, &predictions))).collect())
     }
 
-    /// Held-out losses without and with an effect, as the search compared them.
+    /// Held-out losses without and with an effect, where it acts, as the search compared them.
     fn heldout_losses(&self, chosen: &Chosen) -> Result<[f64; 2], Failure> {
         let [without, with] = &chosen.compared;
-        Ok([self.heldout_loss(without)?, self.heldout_loss(with)?])
+        let loss = |model| self.heldout_loss(chosen.effect.bench, model);
+        Ok([loss(without)?, loss(with)?])
     }
 
-    fn heldout_loss(&self, model: &JointModel) -> Result<f64, Failure> {
-        Ok(self.judge.mean_loss(&self.judge.residuals(model)?, Part::HeldOut))
+    fn heldout_loss(&self, bench: Option<u16>, model: &JointModel) -> Result<f64, Failure> {
+        Ok(self.judge.mean_loss_on(bench, &self.judge.residuals(model)?, Part::HeldOut))
+    }
+
+    fn search_round(&self, round: &Round) -> SearchRound {
+        let attempt = |Attempted { effect, promised, loss }: &Attempted| Attempt {
+            id: effect.descriptor().id.to_owned(),
+            channel: effect.target.name().map(str::to_owned),
+            bench: self.bench_of(effect),
+            parameters: values_of(effect),
+            promised: *promised,
+            loss: *loss,
+        };
+        SearchRound { loss_before: round.loss_before, tried: round.candidates.iter().map(attempt).collect() }
+    }
+
+    /// Name of the one bench that has an effect.
+    fn bench_of(&self, effect: &ActiveEffect) -> Option<String> {
+        let (bench, _) = self.benches.get(usize::from(effect.bench?))?;
+        Some(bench.name.clone())
     }
 
     /// Whether the joint has tendons of which no recording holds a tension.
@@ -461,7 +481,12 @@ impl Case<'_> {
             let heldout = self.heldout_losses(chosen)?;
             if let Some(law) = law::of(&active) {
                 let improvement = improvement([chosen.loss_before, chosen.loss_after]);
-                laws.push((stated_laws::stated(law, &active, heldout, improvement, &stds[values]), active));
+                let mut stated = stated_laws::stated(law, &active, heldout, improvement, &stds[values]);
+                if let Some(bench) = self.bench_of(&active) {
+                    stated.sentence = words::on_bench(&bench, &stated.sentence);
+                    stated.bench = Some(bench);
+                }
+                laws.push((stated, active));
                 continue;
             }
             if let Some(hypothesis) = hypothesis::of(&active) {
@@ -485,7 +510,12 @@ impl Case<'_> {
                 experiments.push(found);
                 Some(words)
             };
-            effects.push((active, named(active, chosen, heldout, &stds[values], objective, separate)));
+            let mut named = named(active, chosen, heldout, &stds[values], objective, separate);
+            if let Some(bench) = self.bench_of(&active) {
+                named.sentence = words::on_bench(&bench, &named.sentence);
+                named.bench = Some(bench);
+            }
+            effects.push((active, named));
         }
         let mut effects: Vec<NamedEffect> =
             effects.into_iter().map(|(active, named)| strongest_first(&active, named)).collect();
@@ -544,7 +574,7 @@ impl Case<'_> {
         }
         let trials = selected.trials.iter();
         let hypotheses: Result<Vec<TriedHypothesis>, Failure> = trials
-            .map(|trial| hypotheses::tried(trial, selected, |model| self.heldout_loss(model)))
+            .map(|trial| hypotheses::tried(trial, selected, |model| self.heldout_loss(None, model)))
             .collect();
         let hypotheses = hypotheses?;
         let diagnosis = Diagnosis {
@@ -572,7 +602,7 @@ impl Case<'_> {
                 })
                 .collect(),
             policy: POLICY,
-            search: selected.rounds.iter().map(search_round).collect(),
+            search: selected.rounds.iter().map(|round| self.search_round(round)).collect(),
             rig: self.name.to_owned(),
             recordings: training.iter().map(|r| r.source().to_owned()).collect(),
             heldout: if heldout.is_empty() {
@@ -620,6 +650,7 @@ fn named(
         probability,
         onset_s,
         channel: active.target.name().map(str::to_owned),
+        bench: None,
         parameters: estimates(&active, stds),
         further: Vec::new(),
         heldout_improvement,
@@ -663,15 +694,4 @@ fn strongest_first(active: &ActiveEffect, mut named: NamedEffect) -> NamedEffect
 fn values_of(effect: &ActiveEffect) -> BTreeMap<String, f64> {
     let specs = effect.descriptor().parameters;
     specs.iter().zip(effect.parameters).map(|(spec, value)| (spec.name.to_owned(), value)).collect()
-}
-
-fn search_round(round: &Round) -> SearchRound {
-    let attempt = |Attempted { effect, promised, loss }: &Attempted| Attempt {
-        id: effect.descriptor().id.to_owned(),
-        channel: effect.target.name().map(str::to_owned),
-        parameters: values_of(effect),
-        promised: *promised,
-        loss: *loss,
-    };
-    SearchRound { loss_before: round.loss_before, tried: round.candidates.iter().map(attempt).collect() }
 }

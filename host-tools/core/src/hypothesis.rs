@@ -234,6 +234,7 @@ impl Hypothesis {
             effect: self,
             parameters: *parameters,
             target: self.target(),
+            bench: None,
         };
         self.starts.iter().map(effect).collect()
     }

@@ -29,11 +29,38 @@ pub struct Candidate {
 }
 
 /// All effects that the parts of `model` can have and that it does not contain yet; of those that are tried on request
-/// only the `asked` ones.
+/// only the `asked` ones. Where there are several benches each effect is also one of a single bench.
 ///
 /// `predictions` are those of `model`; effects whose starting point can be read off their differences use them.
 #[must_use]
 pub fn candidates(
+    model: &JointModel,
+    objective: &Objective,
+    predictions: &[Prediction],
+    asked: &[&str],
+) -> Vec<Candidate> {
+    let mut found = candidates_on(None, model, objective, predictions, asked);
+    let benches = objective.benches();
+    for bench in benches.iter().copied().filter(|_| benches.len() > 1) {
+        let (objective, seen) = seen_on(bench, objective, predictions);
+        found.extend(candidates_on(Some(bench), model, &objective, &seen, asked));
+    }
+    found
+}
+
+/// The recordings of one bench, and what is predicted of them.
+pub(super) fn seen_on(
+    bench: u16,
+    objective: &Objective,
+    predictions: &[Prediction],
+) -> (Objective, Vec<Prediction>) {
+    let seen = predictions.iter().enumerate().filter(|(recording, _)| objective.bench(*recording) == bench);
+    (objective.on(Some(bench)), seen.map(|(_, prediction)| prediction.clone()).collect())
+}
+
+/// The same of one bench, whose recordings these are, or of all.
+fn candidates_on(
+    bench: Option<u16>,
     model: &JointModel,
     objective: &Objective,
     predictions: &[Prediction],
@@ -49,14 +76,11 @@ pub fn candidates(
             continue;
         }
         for target in targets(model, effect) {
-            let contained = model
-                .effects
-                .iter()
-                .any(|active| active.descriptor().id == descriptor.id && active.target.overlaps(target));
-            if contained {
+            let usual = ActiveEffect { target, bench, ..sized(model, effect) };
+            if model.effects.iter().any(|active| active.is_beside(&usual)) {
                 continue;
             }
-            for base in forms(ActiveEffect { target, ..sized(model, effect) }) {
+            for base in forms(usual) {
                 let starts = starts(base, model, objective, predictions);
                 if !starts.is_empty() {
                     found.push(Candidate { starts });
@@ -96,8 +120,9 @@ pub(super) fn targets(model: &JointModel, effect: &dyn Effect) -> Vec<Target> {
         (simulated(channel) || drives(channel)) && effect.is_looked_for_on(**channel, drives(channel))
     };
     let mut targets: Vec<Target> = channels.iter().filter(looked_for).map(|c| Target::One(*c)).collect();
-    let all_tensions = Channel::TENSIONS.iter().all(|c| channels.contains(c) && simulated(c));
-    if all_tensions && effect.is_shared_by_tensions() {
+    // As many as there are: a bench may have tensions at the motor alone.
+    let tensions = Channel::TENSIONS.iter().filter(|c| channels.contains(c) && simulated(c)).count();
+    if tensions > 1 && effect.is_shared_by_tensions() {
         targets.push(Target::Tensions);
     }
     targets
@@ -284,6 +309,22 @@ mod tests {
         for angle in [Channel::ThetaIn, Channel::ThetaOut] {
             assert!(!channels.contains(&Target::One(angle)), "{angle:?}");
         }
+    }
+
+    /// One converter may give all tensions late, however many there are; of a single one that is nothing else.
+    #[test]
+    fn a_lag_is_looked_for_on_all_tensions_that_are_predicted() {
+        let shared = |tensions: &[Channel]| {
+            let predicts =
+                |channel: &Channel| !Channel::TENSIONS.contains(channel) || tensions.contains(channel);
+            let starts = tried("sensor_lag", |mut model| {
+                model.outputs.retain(predicts);
+                model
+            });
+            starts.iter().any(|start| start.target == Target::Tensions)
+        };
+        assert!(shared(&Channel::TENSIONS) && shared(&[Channel::F1, Channel::F3]));
+        assert!(!shared(&[Channel::F1]));
     }
 
     #[test]

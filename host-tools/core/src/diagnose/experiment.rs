@@ -192,7 +192,12 @@ pub(super) fn separating(
     clock_s: f64,
 ) -> Option<Experiment> {
     let own = rig.effects.len();
-    let [named, other] = [&chosen.model, &rival.model].map(|model| afterwards(model, own, clock_s));
+    let bench_index = chosen.effect.bench.or(rival.effect.bench).unwrap_or(0);
+    let [named, other] = [&chosen.model, &rival.model].map(|model| {
+        let mut model = model.clone();
+        model.effects.retain(|effect| effect.is_on(bench_index));
+        afterwards(&model, own, clock_s)
+    });
     let Bearable { shown, allowed, scales } = bearable;
     let [low, high] = shown.angle_rad;
     let middle = 0.5 * (low + high);

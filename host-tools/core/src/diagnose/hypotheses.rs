@@ -113,6 +113,7 @@ pub(super) fn stated(
 ) -> FoundLaw {
     let heldout_improvement = 1.0 - loss_after / loss_before;
     let mut found = FoundLaw {
+        bench: None,
         component: active.descriptor().component.name().to_owned(),
         port: hypothesis.port().name().to_owned(),
         variables: names_of(hypothesis),

@@ -81,6 +81,13 @@ impl Policy {
         self.worth_naming(before, after) && before - after > self.law_share * before
     }
 
+    /// Whether an effect of one bench of several takes enough off there. What is special about a bench may have other causes than an effect,
+    /// parameters and mounting among them, and is looked for on each of the benches.
+    #[must_use]
+    pub fn shows_on_one_bench(&self, before: f64, after: f64) -> bool {
+        before - after > self.law_share * before
+    }
+
     /// Whether a named effect also reduces the loss where it acts least. A saturated sensor or an end stop is inactive most of the time, so
     /// that a small reduction is enough there; with a remaining loss above `much_left` it is not, because it may be an imitation.
     #[must_use]

@@ -75,13 +75,21 @@ pub struct Screened {
     pub start: ActiveEffect,
     /// Estimated share of the present loss that it would take off.
     pub gain: f64,
+    /// Share of the present loss where it acts: less than 1 for an effect of one bench of several.
+    pub weight: f64,
     /// Present model without the effect, with parameters that make room for it; `None` for those that it has.
     pub room: Option<JointModel>,
 }
 
 impl Screened {
-    fn at(start: ActiveEffect, gain: f64) -> Self {
-        Self { start, gain, room: None }
+    fn at(start: ActiveEffect, gain: f64, weight: f64) -> Self {
+        Self { start, gain, weight, room: None }
+    }
+
+    /// Estimated share of the loss that it would take off where it acts.
+    #[must_use]
+    pub fn gain_there(&self) -> f64 {
+        self.gain / self.weight
     }
 }
 
@@ -109,7 +117,7 @@ pub struct Present<'a> {
     pub predictions: &'a [Prediction],
 }
 
-/// Ranks candidates, best first; a gain is asked of them that is above `promising`.
+/// Ranks candidates, best first; a gain is asked of them that is above `promising` where they act.
 #[must_use]
 pub fn screen(
     objective: &Objective,
@@ -162,7 +170,7 @@ pub fn screen(
     let is_rough = background.missing.is_some();
     let background = Background { missing: None, ..background };
     if is_rough {
-        let nearly = |judged: &&Judged| judged.best().gain > NEARLY * promising;
+        let nearly = |judged: &&Judged| judged.best().gain_there() > NEARLY * promising;
         let again = ranked.iter().take(JUDGED_AGAIN).take_while(nearly).count();
         ranked[..again].par_iter_mut().for_each(|judged| {
             if !progress.interrupted()
@@ -284,7 +292,8 @@ impl Background<'_> {
         let inside = basis.inside(&there);
         let there = basis.without(&there);
         let gain_of = |loss: f64| 1.0 - loss / self.loss_now.max(f64::MIN_POSITIVE);
-        let mut at_start = Screened::at(start, gain_of(there.norm_squared()));
+        let weight = self.weight(start.bench);
+        let mut at_start = Screened::at(start, gain_of(there.norm_squared()), weight);
         let direction = &there - now;
         let along = direction.norm_squared();
         let step = if along > 0.0 { -now.dot(&direction) / along } else { 0.0 };
@@ -296,7 +305,7 @@ impl Background<'_> {
             let possible = step > 0.0 || moved.parameters[0] >= spec.lower;
             moved.parameters[0] = moved.parameters[0].clamp(spec.lower, spec.upper);
             let gain = gain_of((now + direction * step).norm_squared());
-            possible.then(|| Screened::at(moved, gain))
+            possible.then(|| Screened::at(moved, gain, weight))
         });
         if along < (1.0 - IN_PLACE_OF) * whole_change {
             let mut x = DVector::zeros(inside.len());
@@ -315,6 +324,16 @@ impl Background<'_> {
             }
         }
         Some(Judged { start: at_start, linear })
+    }
+
+    /// Share of the present loss that is left on a bench, or on all.
+    fn weight(&self, bench: Option<u16>) -> f64 {
+        let Some(bench) = bench else { return 1.0 };
+        let fitted = self.objective.entries().filter(|entry| entry.block.part == Part::Training);
+        let rows = fitted.zip(self.now.iter());
+        let there = rows.filter(|(entry, _)| self.objective.bench(entry.recording) == bench);
+        let loss: f64 = there.map(|(_, row)| row * row).sum();
+        (loss / self.loss_now.max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE)
     }
 
     /// What first passes have found, judged by whole replays.

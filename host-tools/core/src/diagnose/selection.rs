@@ -15,11 +15,13 @@ mod kinds;
 mod laws;
 mod loudest;
 mod names;
+mod one_bench;
 mod own_channel;
 mod repeating;
 mod rival_laws;
 mod trying;
 
+use std::borrow::Cow;
 use std::cmp::Ordering;
 
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
@@ -81,7 +83,7 @@ pub struct Attempted {
     pub loss: Option<f64>,
 }
 
-/// One selected effect.
+/// One selected effect. Its losses and those of its rivals are those where it acts: on one bench, or on all.
 #[derive(Clone, Debug)]
 pub struct Chosen {
     /// The effect and its target, as fitted when it was selected.
@@ -101,11 +103,12 @@ pub struct Chosen {
 impl Chosen {
     /// The effect that was added last to `with`, compared with `without`.
     fn newest_of(with: &Fitted, without: &Fitted, others: Vec<Tried>) -> Self {
+        let bench = with.newest().bench;
         Self {
             effect: with.newest(),
             model: with.without_ordinary(),
-            loss_before: without.loss,
-            loss_after: with.loss,
+            loss_before: without.loss_on(bench),
+            loss_after: with.loss_on(bench),
             compared: [without, with].map(|fitted| fitted.solution.model.clone()),
             others,
         }
@@ -124,7 +127,7 @@ impl Chosen {
     fn takes_kind(&mut self, with: &Fitted) {
         self.effect = with.newest();
         self.model = with.without_ordinary();
-        self.loss_after = with.loss;
+        self.loss_after = with.loss_on(self.effect.bench);
         self.compared[1] = with.solution.model.clone();
     }
 
@@ -143,10 +146,11 @@ impl Chosen {
 
     /// Updates the losses to those with all other effects present; rivals keep their odds.
     fn stands(&mut self, before: &Fitted, after: &Fitted) {
+        let [without, with] = [before, after].map(|fitted| fitted.loss_on(self.effect.bench));
         for tried in &mut self.others {
-            tried.loss *= after.loss / self.loss_after;
+            tried.loss *= with / self.loss_after;
         }
-        (self.loss_before, self.loss_after) = (before.loss, after.loss);
+        (self.loss_before, self.loss_after) = (without, with);
         self.compared = [before, after].map(|fitted| fitted.solution.model.clone());
     }
 }
@@ -314,6 +318,8 @@ struct Fitted {
     solution: Solution,
     loss: f64,
     stretch_losses: StretchLosses,
+    /// Bench of every recording.
+    benches: Vec<u16>,
     /// Whether the fit converged; otherwise it is sufficient for ranking only.
     finished: bool,
     /// Whether the newest effect begins at a moment that no recording covers.
@@ -341,10 +347,37 @@ impl Fitted {
         places.iter().rev().fold(all, |(layout, model), place| layout.without(&model, *place))
     }
 
+    /// Stretch losses of the recordings of one bench, or of all.
+    fn stretch_losses_on(&self, bench: Option<u16>) -> Cow<'_, StretchLosses> {
+        let Some(bench) = bench else { return Cow::Borrowed(&self.stretch_losses) };
+        let there =
+            self.stretch_losses.iter().filter(|((recording, _), _)| self.benches[*recording] == bench);
+        Cow::Owned(there.map(|(place, loss)| (*place, *loss)).collect())
+    }
+
+    /// Loss over the recordings of one bench, or over all.
+    fn loss_on(&self, bench: Option<u16>) -> f64 {
+        if bench.is_none() {
+            return self.loss;
+        }
+        let losses = self.stretch_losses_on(bench);
+        let [sum, count] = losses.values().fold([0.0; 2], |[sum, count], [s, c]| [sum + s, count + c]);
+        sum / f64::max(count, 1.0)
+    }
+
     /// Whether `effect`, which `before` lacks, reaches the threshold `worth`, and is visible also without the data that support it most: an
     /// effect of the catalogue at all, without one moment or, if it begins at a moment, without the most favourable ones; a law without these
-    /// by the same share, because one of its many forms can fit a few moments by chance.
+    /// by the same share, because one of its many forms can fit a few moments by chance. An effect of one bench of several has to show there,
+    /// by the share that a law has to take off: what is special about a bench has more causes than effects.
     fn shows(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
+        let [without, with] = [before, self].map(|fitted| fitted.loss_on(effect.bench));
+        let is_clear = effect.bench.is_none() || POLICY.shows_on_one_bench(without, with);
+        is_clear && self.shows_anywhere(before, effect, worth)
+    }
+
+    /// The same, wherever the effect acts.
+    fn shows_anywhere(&self, before: &Self, effect: &ActiveEffect, worth: impl Fn(f64, f64) -> bool) -> bool {
+        let bench = effect.bench;
         let is_law = law::of(effect).is_some();
         let begins_at_a_moment = moment_of(effect).is_some();
         let elsewhere = |[without, with]: &[f64; 2]| {
@@ -357,13 +390,25 @@ impl Fitted {
         };
         let quieter_without =
             if is_law || begins_at_a_moment { without_the_loudest } else { without_the_loudest_moment };
-        let quieter = quieter_without(&before.stretch_losses, &self.stretch_losses);
-        worth(before.loss, self.loss) && quieter.iter().all(elsewhere)
+        let quieter = quieter_without(&before.stretch_losses_on(bench), &self.stretch_losses_on(bench));
+        let [without, with] = [before, self].map(|fitted| fitted.loss_on(bench));
+        worth(without, with) && quieter.iter().all(elsewhere)
     }
 
     /// Loss times the factor that favours simpler effects.
     fn handicapped(&self) -> f64 {
-        self.loss * handicap(&self.newest())
+        self.handicapped_by(&self.newest())
+    }
+
+    /// Loss times the factor of `effect`, where that acts.
+    fn handicapped_by(&self, effect: &ActiveEffect) -> f64 {
+        let factor = handicap(effect);
+        if effect.bench.is_none() {
+            return factor * self.loss;
+        }
+        let count = |losses: &StretchLosses| losses.values().map(|[_, count]| count).sum::<f64>();
+        let weight = count(&self.stretch_losses_on(effect.bench)) / count(&self.stretch_losses).max(1.0);
+        self.loss + weight * (factor - 1.0) * self.loss_on(effect.bench)
     }
 
     fn best_first(&self, other: &Self) -> Ordering {
@@ -386,9 +431,12 @@ struct Explanation {
 }
 
 impl Explanation {
-    /// Number of named effects; instances of one effect on one component count once.
+    /// Number of named effects; instances of one effect on one component, of any bench, count once.
     fn names(&self) -> usize {
-        (0..self.chosen.len()).filter(|index| !is_further(&self.chosen, *index)).count()
+        let is_new = |index: &usize| {
+            self.chosen[..*index].iter().all(|before| !before.effect.is_alike(&self.chosen[*index].effect))
+        };
+        (0..self.chosen.len()).filter(is_new).count()
     }
 }
 
@@ -438,7 +486,9 @@ impl Search<'_> {
     fn judged(&self, layout: Layout, solution: Solution, finished: bool) -> Fitted {
         let loss = self.objective.mean_loss(&solution.residuals, Part::Training);
         let stretch_losses = self.objective.stretch_losses(&solution.residuals);
-        Fitted { layout, solution, loss, stretch_losses, finished, unseen: false }
+        let benches =
+            (0..self.objective.recordings()).map(|recording| self.objective.bench(recording)).collect();
+        Fitted { layout, solution, loss, stretch_losses, benches, finished, unseen: false }
     }
 }
 
@@ -462,7 +512,7 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
 /// The effect of the catalogue that remains of a negligible one, if any.
 fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffect> {
     let (id, strength) = effect.effect.remainder(&effect.parameters)?;
-    let mut other = ActiveEffect { target: effect.target, ..sized(believed, find(id)?) };
+    let mut other = ActiveEffect { target: effect.target, bench: effect.bench, ..sized(believed, find(id)?) };
     other.parameters[0] = strength;
     Some(other)
 }
@@ -482,7 +532,7 @@ fn negligible(objective: &Objective, believed: &JointModel, effect: &ActiveEffec
     let Some(strength) = descriptor.parameters.first() else { return false };
     let usual = typical(believed, descriptor.component, strength);
     largest_ordinary(believed, effect.effect).is_some_and(|largest| effect.parameters[0] <= largest)
-        || too_little_travel(objective, effect)
+        || too_little_travel(&objective.on(effect.bench), effect)
         || effect.effect.is_hardly_there(&effect.parameters, usual)
 }
 

@@ -22,6 +22,7 @@ pub(super) fn stated(
     let coefficients = coefficients(active, stds);
     let heldout_improvement = 1.0 - loss_after / loss_before;
     let mut found = FoundLaw {
+        bench: None,
         component: descriptor.component.name().to_owned(),
         port: law.port().name().to_owned(),
         variables: vec![law.variable().name().to_owned()],

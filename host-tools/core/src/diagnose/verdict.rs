@@ -64,12 +64,15 @@ pub struct NamedEffect {
     pub onset_s: Option<f64>,
     /// Channel, for an effect of a sensor.
     pub channel: Option<String>,
+    /// The one bench of a study that has it; `None` if all have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Fitted parameters; of the strongest instance where the part has several.
     pub parameters: BTreeMap<String, Estimate>,
     /// Fitted parameters of the other instances, strongest first: the harmonics of cogging beside the strongest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further: Vec<BTreeMap<String, Estimate>>,
-    /// Part of the held-out loss that it removes, at most 1; negative where held-out data are predicted worse with it.
+    /// Part of the held-out loss of its bench, or of all, that it removes, at most 1; negative where held-out data are predicted worse with it.
     pub heldout_improvement: f64,
     /// Part of the loss that it removes of the data that were fitted, for which it was chosen, 0 to 1.
     pub training_improvement: f64,
@@ -205,6 +208,9 @@ pub struct Unexplained {
 /// Physics without a name that the diagnosis stands behind: a closed form at one port of the joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundLaw {
+    /// The one bench of a study that it is of; `None` if it is of all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Part of the joint.
     pub component: String,
     /// Where it acts: the name that `[[law]]` of a rig file has for it.
@@ -332,6 +338,9 @@ pub struct Attempt {
     pub id: String,
     /// Channel, for an effect of a sensor.
     pub channel: Option<String>,
+    /// The one bench of a study on which it was tried; `None` for all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Parameters where they were left.
     pub parameters: BTreeMap<String, f64>,
     /// Share of the fitted loss that one simulation promised, 0 to 1.

@@ -101,6 +101,32 @@ pub(super) fn sentence(active: &ActiveEffect, improvement: f64, duration_s: f64)
     text
 }
 
+/// The same of an effect that one bench alone has.
+pub(super) fn on_bench(bench: &str, sentence: &str) -> String {
+    format!("On bench {bench}: {sentence}")
+}
+
+/// The named effects, each once, with the benches that have it where not all have.
+fn names(effects: &[NamedEffect]) -> Vec<String> {
+    let mut named: Vec<(&str, Vec<&str>)> = Vec::new();
+    for effect in effects {
+        let bench = effect.bench.as_deref();
+        match (named.iter_mut().find(|(id, benches)| *id == effect.id && !benches.is_empty()), bench) {
+            (Some((_, benches)), Some(bench)) => {
+                if !benches.contains(&bench) {
+                    benches.push(bench);
+                }
+            }
+            _ => named.push((&effect.id, bench.into_iter().collect())),
+        }
+    }
+    let said = |(id, benches): &(&str, Vec<&str>)| match &benches[..] {
+        [] => (*id).to_owned(),
+        some => format!("{id} ({})", some.join(", ")),
+    };
+    named.iter().map(said).collect()
+}
+
 /// What something does to the loss of held-out data, of which it removes such a part.
 pub(super) fn on_unseen_data(improvement: f64) -> String {
     if improvement >= 0.005 {
@@ -182,7 +208,10 @@ pub(super) fn summary(
         "{changes} the held-out loss from {loss_recalibrated:.2} to {loss_after:.2} (normalised error; 1 is what sensor noise and \
          an ordinary bench leave)"
     );
-    let doubt = if POLICY.pays(loss_recalibrated, loss_after) {
+    // Of many benches one alone counts little.
+    let shows_on_its_bench =
+        |effect: &NamedEffect| effect.bench.is_some() && POLICY.pays(1.0, 1.0 - effect.heldout_improvement);
+    let doubt = if POLICY.pays(loss_recalibrated, loss_after) || effects.iter().any(shows_on_its_bench) {
         ""
     } else {
         " Held-out data do not confirm this: the effect is absent there, or hardly visible."
@@ -195,7 +224,8 @@ pub(super) fn summary(
         }
         Verdict::Recalibrate => format!("Parameters were wrong, and no physics is missing. {parameters}"),
         Verdict::MissingPhysics => {
-            let names: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
+            let names = names(effects);
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let them = if names.len() > 1 { "them" } else { "it" };
             format!("The simulation lacks {}: adding {them} {effect}.{doubt} {parameters}", listed(&names))
         }

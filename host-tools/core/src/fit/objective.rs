@@ -158,6 +158,7 @@ impl Objective {
                 Use::HeldOut => (Part::HeldOut, false),
             };
             let mut dataset = Dataset::new(model, recording, variation, part, split)?;
+            dataset.bench = bench as u16;
             clocks_s.resize(clocks_s.len().max(bench + 1), 0.0);
             dataset.input.continues_after(clocks_s[bench]);
             clocks_s[bench] += recording.duration_s();
@@ -258,6 +259,30 @@ impl Objective {
     #[must_use]
     pub fn recordings(&self) -> usize {
         self.datasets.len()
+    }
+
+    /// Bench of one recording.
+    #[must_use]
+    pub fn bench(&self, recording: usize) -> u16 {
+        self.datasets[recording].bench
+    }
+
+    /// Benches of the recordings that are fitted to, in ascending order.
+    #[must_use]
+    pub fn benches(&self) -> Vec<u16> {
+        let fitted = self.datasets.iter().filter(|dataset| dataset.is_fitted());
+        let mut benches: Vec<u16> = fitted.map(|dataset| dataset.bench).collect();
+        benches.sort_unstable();
+        benches.dedup();
+        benches
+    }
+
+    /// The recordings of one bench, or all of them.
+    #[must_use]
+    pub fn on(&self, bench: Option<u16>) -> Self {
+        let mut some = self.clone();
+        some.datasets.retain(|dataset| bench.is_none_or(|bench| dataset.bench == bench));
+        some
     }
 
     /// Blocks of one recording.
@@ -387,7 +412,9 @@ impl Objective {
         let mut values = Vec::new();
         for (dataset, prediction) in self.datasets.iter().zip(predictions) {
             let seen = |(series, _): &(Series, _)| match series {
-                Series::Channel(channel) if effect.target.includes(*channel) => {
+                Series::Channel(channel)
+                    if effect.target.includes(*channel) && effect.is_on(dataset.bench) =>
+                {
                     let mut seen = prediction.seen_through(*channel, effect, &dataset.input)?;
                     dataset.cut(*channel, &mut seen);
                     Ok(moments_of(&seen, &dataset.blocks))
@@ -466,9 +493,15 @@ impl Objective {
     /// Mean loss over a part of the data; 1 where every residual is one scale.
     #[must_use]
     pub fn mean_loss(&self, residuals: &Residuals, part: Part) -> f64 {
+        self.mean_loss_on(None, residuals, part)
+    }
+
+    /// The same over the recordings of one bench, or all of them.
+    #[must_use]
+    pub fn mean_loss_on(&self, bench: Option<u16>, residuals: &Residuals, part: Part) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for (entry, value) in self.entries().zip(&residuals.values) {
-            if entry.block.part == part {
+            if entry.block.part == part && bench.is_none_or(|bench| self.bench(entry.recording) == bench) {
                 sum += loss(*value);
                 count += 1.0;
             }

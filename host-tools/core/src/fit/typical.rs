@@ -45,7 +45,8 @@ pub fn typical(model: &JointModel, component: Component, spec: &ParameterSpec) -
     (size * spec.default).clamp(spec.lower, spec.upper)
 }
 
-/// Torques over those of the paper's joint: of a drive by what it can do, behind it by what cables and load bring.
+/// Torques over those of the paper's joint: of a drive by what it can do, behind it by what cables and load bring; dry friction that the
+/// cables have to move is a load.
 fn torque(model: &JointModel, component: Component) -> f64 {
     let parameters = &model.parameters;
     let stall = model.strength_nm().map(|strength_nm| strength_nm / STALL_NM);
@@ -60,7 +61,12 @@ fn torque(model: &JointModel, component: Component) -> f64 {
     });
     let weight =
         parameters.load.map_or(0.0, |load| load.mass_kg * GRAVITY_M_S2 * load.arm_m / WEIGHT_TORQUE_NM);
-    let largest = cables.max(weight);
+    let dry = |effect: &ActiveEffect| {
+        let moved = parameters.tendon.is_some() && effect.descriptor().id == "joint_coulomb_friction";
+        if moved { effect.parameters[0] / WEIGHT_TORQUE_NM } else { 0.0 }
+    };
+    let friction = model.effects.iter().map(dry).fold(0.0, f64::max);
+    let largest = cables.max(weight).max(friction);
     if largest > 0.0 { largest } else { stall.unwrap_or(0.0) }
 }
 
@@ -90,6 +96,23 @@ mod tests {
                 assert!((a - b).abs() <= 1e-12 * b.abs(), "{sized:?} for {plain:?}");
             }
         }
+    }
+
+    /// Slack bands that turn a drum: 5 N·m of slip is nearly seven times the weight of the paper's joint; 0.05 N·m beside a weight is no load.
+    #[test]
+    fn dry_friction_that_cables_move_is_a_load() {
+        let friction = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap());
+        let spring_nm_per_rad = |pretension_n: f64, mass_kg: f64, torque_nm: f64| {
+            let mut model = bench();
+            model.parameters.tendon.as_mut().unwrap().pretension_n = pretension_n;
+            model.parameters.load.as_mut().unwrap().mass_kg = mass_kg;
+            model.effects = vec![friction.with("torque_nm", torque_nm)];
+            sized(&model, find("joint_spring").unwrap()).parameters[0]
+        };
+        let usual = spring_nm_per_rad(30.0, 2.5, 0.05);
+        assert!((usual / 0.3 - 1.0).abs() < 1e-9, "{usual}");
+        let of_drum = spring_nm_per_rad(0.01, 0.0, 5.0);
+        assert!((of_drum / (usual * 5.0 / 0.735_75) - 1.0).abs() < 1e-3, "{of_drum}");
     }
 
     /// A tenth of torque, force and power, at the same angles and speeds.

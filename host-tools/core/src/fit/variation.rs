@@ -31,8 +31,8 @@ impl Variation {
         Self { base, bench, stated_effects: shared.effects.len(), kept, set }
     }
 
-    /// The joint of the recording: nominal parameters and found effects of `shared`, but for those that are kept; sensors, channels,
-    /// position loop and stated effects of the bench.
+    /// The joint of the recording: nominal parameters of `shared`, but for those that are kept, and its found effects, but for those that
+    /// another bench alone has; sensors, channels, position loop and stated effects of the bench.
     #[must_use]
     pub fn apply(&self, shared: &JointModel) -> JointModel {
         let mut model = JointModel {
@@ -50,7 +50,8 @@ impl Variation {
                 model.set_value(&parameter, value);
             }
         }
-        model.effects.extend_from_slice(&shared.effects[self.stated_effects.min(shared.effects.len())..]);
+        let found = shared.effects[self.stated_effects.min(shared.effects.len())..].iter();
+        model.effects.extend(found.filter(|effect| effect.is_on(self.bench as u16)));
         for own in shared.own.values.iter().filter(|own| own.bench == self.bench) {
             // What was different in the recording is known.
             if let Some(value) = own.value

@@ -47,6 +47,7 @@ fn diagnosis() -> Diagnosis {
         probability: 0.9997,
         onset_s: Some(21.4),
         channel: None,
+        bench: None,
         parameters: BTreeMap::from([
             ("extra_wrap_angle_rad".into(), estimate(0.8231, Some(0.0214), "rad")),
             ("duration_s".into(), estimate(6.31, Some(0.12), "s")),
@@ -71,6 +72,7 @@ fn diagnosis() -> Diagnosis {
         probability: 0.962,
         onset_s: None,
         channel: None,
+        bench: None,
         parameters: BTreeMap::from([("torque_nm".into(), estimate(0.003_92, Some(0.000_31), "N m"))]),
         further: vec![],
         heldout_improvement: 0.083,
@@ -84,6 +86,7 @@ fn diagnosis() -> Diagnosis {
         probability: 0.88,
         onset_s: None,
         channel: Some("f4_n".into()),
+        bench: None,
         parameters: BTreeMap::from([("offset".into(), estimate(2.0, None, "N"))]),
         further: vec![],
         heldout_improvement: 0.031,

@@ -40,7 +40,10 @@ pub(super) fn section(findings: &Findings) -> Markup {
 pub fn card(effect: &NamedEffect) -> Markup {
     html! {
         article.card {
-            h3 { (names::words(&effect.id)) " " code { (effect.id) } }
+            h3 {
+                (names::words(&effect.id)) " " code { (effect.id) }
+                @if let Some(bench) = &effect.bench { " on bench " (bench) }
+            }
             p { (effect.sentence) }
             dl.facts {
                 div { dt { "Probability" } dd { (figures::share(effect.probability)) } }

@@ -113,7 +113,7 @@ fn read_entry(
         }
     }
     for target in targets(section, descriptor)? {
-        let one = ActiveEffect { effect, parameters, target };
+        let one = ActiveEffect { effect, parameters, target, bench: None };
         if active.iter().any(|other| one.excludes(other)) {
             let named = target.name().map_or(String::new(), |name| format!(" on {name}"));
             let advice = effect.instances_differ_in().map_or(String::from("keep one table"), |name| {

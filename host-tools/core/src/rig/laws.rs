@@ -78,7 +78,7 @@ fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
             .ok_or_else(|| coefficients.lacks(spec.name, &format!("{}, {}", spec.meaning, spec.unit)))?;
     }
     check_units(section, law)?;
-    Ok(ActiveEffect { effect: law, parameters, target: target(section, law)? })
+    Ok(ActiveEffect { effect: law, parameters, target: target(section, law)?, bench: None })
 }
 
 /// Units may be left out, but not be others than the formula's.

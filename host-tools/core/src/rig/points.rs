@@ -70,7 +70,7 @@ pub(super) fn read(section: &Section, points: &Located) -> Result<ActiveEffect, 
     let law = Hypothesis::of_points(name, port, channel, variables, table)
         .map_err(|reason| at(&section.span, format!("law `{name}`: {reason}")))?;
     let target = channel.map_or(Target::None, Target::One);
-    Ok(ActiveEffect { effect: law, parameters: [0.0; MAX_PARAMETERS], target })
+    Ok(ActiveEffect { effect: law, parameters: [0.0; MAX_PARAMETERS], target, bench: None })
 }
 
 fn check_units(section: &Section, port: Port, variables: &[Variable]) -> Result<(), Failure> {

@@ -96,9 +96,9 @@ impl Study {
         ))
     }
 
-    /// Whether the joint of a recording is the shared one.
+    /// Whether the joint of a recording is the shared one, whatever is found: effects may be those of one bench of several.
     fn is_plain(&self, listed: &StudyRecording) -> bool {
-        listed.bench == 0 && listed.set.is_empty() && self.fitted_on(0).is_empty()
+        self.benches.len() == 1 && listed.set.is_empty() && self.fitted_on(0).is_empty()
     }
 
     fn variation(&self, listed: &StudyRecording, joint: &JointModel) -> Result<Variation, Failure> {

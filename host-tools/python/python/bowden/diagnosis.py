@@ -177,7 +177,8 @@ class Diagnosis:
         for effect in self.effects:
             parameters = ", ".join(f"{name} {estimate}" for name, estimate in effect.parameters.items())
             share = f"{effect.heldout_improvement:.0%}"
-            lines.append(f"| {effect.id} | {effect.component} | {effect.probability:.2f} | {parameters} | {share} |")
+            name = f"{effect.id} ({effect.bench})" if effect.bench else effect.id
+            lines.append(f"| {name} | {effect.component} | {effect.probability:.2f} | {parameters} | {share} |")
         for law in self.laws:
             values = ", ".join(f"{name} = {estimate}" for name, estimate in law.coefficients.items())
             lines += ["", f"`{law.port} = {law.formula}` with {values}"]

@@ -84,6 +84,8 @@ class Effect:
     rivals: tuple[Rival, ...] = ()
     further: tuple[dict[str, Estimate], ...] = ()
     """Parameters of other instances, strongest first."""
+    bench: str | None = None
+    """The one bench of a study that has it; `None` if all have it."""
 
 
 @dataclass(frozen=True)
@@ -188,6 +190,8 @@ class Law:
     heldout_improvement: float
     training_improvement: float
     sentence: str
+    bench: str | None = None
+    """The one bench of a study that it is of; `None` if it is of all."""
 
 
 @dataclass(frozen=True)

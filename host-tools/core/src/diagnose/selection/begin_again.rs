@@ -26,13 +26,15 @@ impl Search<'_> {
         now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<bool, Failure> {
-        let (rivals, most, own) = match now.chosen.first() {
+        let (mut rivals, most, own) = match now.chosen.first() {
             Some(first) => {
                 let own = Tried { effect: first.effect, model: first.model.clone(), loss: first.loss_after };
                 (first.others.clone(), RIVALS, Some(own))
             }
             None => (beginnings(nothing, rounds), BEGINNINGS, None),
         };
+        // What one bench of several has leads the others nowhere.
+        rivals.retain(|rival| rival.effect.bench.is_none());
         let mut best: Option<Explanation> = None;
         for (place, rival) in rivals.iter().take(most).enumerate() {
             if self.progress.interrupted() {

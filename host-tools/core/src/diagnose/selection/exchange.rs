@@ -5,7 +5,7 @@
 
 use bowden_model::effect::{ActiveEffect, Component};
 
-use super::{Chosen, Explanation, Fitted, Search, Tried, handicap, instances, is_further, remove};
+use super::{Chosen, Explanation, Fitted, Search, Tried, instances, is_further, remove};
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -34,21 +34,22 @@ impl Search<'_> {
         }
         let own = &mut chosen[index];
         let not_fitted = own.others.split_off(rivals.len());
-        own.others = rivals.iter().map(|fitted| fitted.tried(fitted.loss)).collect();
+        let bench = own.effect.bench;
+        own.others = rivals.iter().map(|fitted| fitted.tried(fitted.loss_on(bench))).collect();
         // Candidates that are not refitted keep their odds.
-        let now = present.loss / own.loss_after;
+        let now = present.loss_on(bench) / own.loss_after;
         own.others.extend(not_fitted.into_iter().map(|tried| Tried { loss: now * tried.loss, ..tried }));
-        own.loss_after = present.loss;
+        own.loss_after = present.loss_on(bench);
         own.model = present.without_ordinary();
         own.compared[1] = present.solution.model.clone();
-        let own_handicapped = handicap(&own.effect) * present.loss;
+        let own_handicapped = present.handicapped_by(&own.effect);
         rivals.retain(|rival| rival.handicapped() < own_handicapped);
         rivals.sort_by(Fitted::best_first);
         let instances = instances(chosen, index);
         let Some(best) = self.first_told(rivals, present, &instances)? else { return Ok(()) };
         let before = chosen[index].clone();
         remove(chosen, &instances);
-        let tried = best.tried(best.loss);
+        let tried = best.tried(best.loss_on(best.newest().bench));
         let is_other = |other: &Tried| !other.effect.is_beside(&tried.effect);
         let mut others: Vec<Tried> = before.others.into_iter().filter(is_other).collect();
         others.push(Tried { effect: before.effect, model: before.model, loss: before.loss_after });

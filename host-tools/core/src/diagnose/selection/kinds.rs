@@ -34,11 +34,13 @@ impl Search<'_> {
             let free = present.layout.free(self.believed, &model);
             let ranked = solve_for_ranking(self.objective, &model, &free, PATIENCE, &known)?;
             let ranked = self.judged(present.layout.clone(), ranked, false);
-            if !likelier(present.loss, ranked.loss) {
+            if !likelier(present.loss_on(found.bench), ranked.loss_on(found.bench)) {
                 continue;
             }
             let with = self.fit(present.layout.clone(), &ranked.solution.model, &[FINE_STEP, FINE_STEP])?;
-            if likelier(present.loss, with.loss) && self.holds_across_recordings(present, &with, likelier)? {
+            if likelier(present.loss_on(found.bench), with.loss_on(found.bench))
+                && self.holds_across_recordings(present, &with, likelier)?
+            {
                 newest.takes_kind(&with);
                 *present = with;
             }

@@ -1,7 +1,9 @@
 //! Selection of laws, in place of named effects or in addition to them. Laws are tried once no further effect is found, and must reduce the
 //! loss by more than an effect must.
 
-use super::{Explanation, Fitted, Kind, PROMISING, Round, Search, Worth};
+use super::{Explanation, Fitted, Kind, PROMISING, Round, Search, Worth, remove};
+use crate::diagnose::candidates::seen_on;
+use crate::diagnose::law_candidates::law_candidates;
 use crate::diagnose::policy::{POLICY, Policy};
 use crate::diagnose::unexplained::unexplained;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -21,10 +23,49 @@ impl Search<'_> {
         now: &mut Explanation,
         rounds: &mut Vec<Round>,
     ) -> Result<(), Failure> {
+        self.laws_in_place_on_benches(now, rounds)?;
         if self.law_in_place_of_names(nothing, now, rounds)? {
             self.add_names(now, rounds, Policy::worth_naming)?;
         }
         self.add_laws(now, rounds)
+    }
+
+    /// Replaces the effects that one bench of several has by one law that predicts its recordings clearly better, for each such bench: errors
+    /// of several of its sensors may stand for one thing that acts on all.
+    fn laws_in_place_on_benches(
+        &self,
+        now: &mut Explanation,
+        rounds: &mut Vec<Round>,
+    ) -> Result<(), Failure> {
+        for bench in self.objective.benches() {
+            let Explanation { fit: present, chosen } = &mut *now;
+            let of_bench = |place: &usize| chosen[*place].effect.bench == Some(bench);
+            let places: Vec<usize> = (0..chosen.len()).filter(of_bench).collect();
+            let better: Worth = if places.len() > 1 { Policy::worth_naming } else { Policy::worth_stating };
+            if places.is_empty() || self.progress.interrupted() {
+                continue;
+            }
+            let (layout, without) = present.without(&places);
+            let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
+            let before = self.without_exhausted(&rest)?;
+            let removed_share = 1.0 - present.loss_on(Some(bench)) / before.loss_on(Some(bench));
+            let predictions = self.objective.predict(&before.solution.model)?;
+            let (objective, seen) = seen_on(bench, self.objective, &predictions);
+            let mut all = law_candidates(&before.without_ordinary(), &objective, &seen);
+            all.iter_mut().flat_map(|law| &mut law.starts).for_each(|start| start.bench = Some(bench));
+            let promising = (RIVALLING * removed_share).max(PROMISING);
+            let (record, fits) = self.best_of(&before, &predictions, &all, promising, None)?;
+            rounds.push(Round { loss_before: before.loss, candidates: record });
+            if let Some((found, with)) = self.found(&before, &rest, fits, Policy::worth_stating)?
+                && with
+                    .shows_anywhere(present, &with.newest(), |without, with| better(&POLICY, without, with))
+            {
+                remove(chosen, &places);
+                chosen.push(found);
+                *present = with;
+            }
+        }
+        Ok(())
     }
 
     /// Replaces all named effects, or all but the first, by one law that predicts clearly better, and returns whether it did. Against one

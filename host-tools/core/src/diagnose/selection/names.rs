@@ -59,6 +59,7 @@ impl Search<'_> {
             now.fit = with;
             self.choose_kind(now)?;
             self.add_instances(now)?;
+            self.add_on_other_benches(now, rounds, worth)?;
         }
         self.exchange(now)?;
         if self.progress.interrupted() { Ok(()) } else { self.prune(now) }
@@ -80,6 +81,7 @@ impl Search<'_> {
                 return Ok(None);
             };
             if self.is_no_parameter(without, &with, with.newest_place())?
+                && self.is_no_parameter_of_its_bench(without, &with, worth)?
                 && self.holds_across_recordings(without, &with, |a, b| worth(&POLICY, a, b))?
             {
                 return Ok(Some((chosen, with)));
@@ -111,30 +113,33 @@ impl Search<'_> {
         let Some((place, _)) = first else { return Ok(None) };
         let with_ordinary = beside.remove(place);
         let best = fits.remove(place);
+        let bench = best.newest().bench;
         let losses = Losses {
-            before: before.loss,
-            with: best.loss,
-            ordinary: present.loss,
-            with_both: with_ordinary.loss,
+            before: before.loss_on(bench),
+            with: best.loss_on(bench),
+            ordinary: present.loss_on(bench),
+            with_both: with_ordinary.loss_on(bench),
         };
         let shows_beside_it = || with_ordinary.shows(present, &with_ordinary.newest(), worth_it);
         if !losses.found(worth) || !(losses.replaces_ordinary() || shows_beside_it()) {
             return Ok(None);
         }
         // Candidates that were not refitted with the nuisance terms are assumed to improve by the same factor as the best.
-        let gains = with_ordinary.loss / best.loss;
+        let gains = losses.with_both / losses.with;
         let mut others: Vec<Tried> = fits
             .iter()
             .enumerate()
             .map(|(other, fitted)| {
-                fitted.tried(beside.get(other).map_or(gains * fitted.loss, |beside| beside.loss))
+                let beside = beside.get(other).map(|beside| beside.loss_on(bench));
+                fitted.tried(beside.unwrap_or_else(|| gains * fitted.loss_on(bench)))
             })
             .collect();
         others.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-        let Tried { effect, model, loss: loss_after } = best.tried(with_ordinary.loss);
+        let Tried { effect, model, loss: loss_after } = best.tried(losses.with_both);
         let without = if losses.replaces_ordinary() { before } else { present };
         let compared = [without, &with_ordinary].map(|fitted| fitted.solution.model.clone());
-        let chosen = Chosen { effect, model, loss_before: without.loss, loss_after, compared, others };
+        let loss_before = without.loss_on(bench);
+        let chosen = Chosen { effect, model, loss_before, loss_after, compared, others };
         Ok(Some((chosen, with_ordinary, without)))
     }
 

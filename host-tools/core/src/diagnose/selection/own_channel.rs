@@ -29,10 +29,11 @@ impl Search<'_> {
     ) -> Result<bool, Failure> {
         let effect = &with.solution.model.effects[place];
         let told = effect.descriptor().component != Component::Sensors
-            || POLICY.worth_naming_in_doubt(without.loss, with.loss)
+            || POLICY.worth_naming_in_doubt(without.loss_on(effect.bench), with.loss_on(effect.bench))
             || self.progress.interrupted();
-        let left_by = |own: f64| (without.loss - own).max(0.0);
-        let is_worth_a_name = |own| POLICY.worth_naming(without.loss, left_by(own));
+        let loss = without.loss_on(effect.bench);
+        let left_by = |own: f64| (loss - own).max(0.0);
+        let is_worth_a_name = |own| POLICY.worth_naming(loss, left_by(own));
         Ok(told || self.own_change(with, place)?.is_none_or(is_worth_a_name))
     }
 
@@ -51,7 +52,9 @@ impl Search<'_> {
             .enumerate()
             .filter(|(_, entry)| entry.block.part == Part::Training)
             .enumerate()
-            .filter(|(_, (_, entry))| is_of_sensor(entry.series))
+            .filter(|(_, (_, entry))| {
+                is_of_sensor(entry.series) && effect.is_on(objective.bench(entry.recording))
+            })
             .map(|(row, (place, _))| (row, place))
             .collect();
         if own.is_empty() {

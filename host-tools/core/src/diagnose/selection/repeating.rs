@@ -33,7 +33,11 @@ impl Search<'_> {
         let Explanation { fit: present, chosen } = now;
         for index in 0..chosen.len() {
             let effect = chosen[index].effect;
-            if is_further(chosen, index) || effect.effect.instances_differ_in().is_none() {
+            // Patterns are read off all recordings.
+            if is_further(chosen, index)
+                || effect.bench.is_some()
+                || effect.effect.instances_differ_in().is_none()
+            {
                 continue;
             }
             let Some((layout, model, added)) = self.further_instances(present, &effect)? else { continue };
@@ -88,7 +92,8 @@ impl Search<'_> {
             {
                 break;
             }
-            let base = ActiveEffect { target: effect.target, ..sized(&model, effect.effect) };
+            let base =
+                ActiveEffect { target: effect.target, bench: effect.bench, ..sized(&model, effect.effect) };
             let Some(Pattern { new, beside }) =
                 further_pattern(base, &there, angle, &model, objective, &predictions)
             else {

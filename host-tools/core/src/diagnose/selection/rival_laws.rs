@@ -61,10 +61,12 @@ impl Search<'_> {
             self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?
         };
         let before = self.without_exhausted(&rest)?;
-        let removed_share = 1.0 - present.loss / before.loss;
+        let bench = chosen[places[0]].effect.bench;
+        let removed_share = 1.0 - present.loss_on(bench) / before.loss_on(bench);
         let predictions = self.objective.predict(&before.solution.model)?;
         let mut all = law_candidates(&before.without_ordinary(), self.objective, &predictions);
         all.retain(|candidate| places.iter().all(|place| can_replace(candidate, &chosen[*place].effect)));
+        all.iter_mut().flat_map(|candidate| &mut candidate.starts).for_each(|law| law.bench = bench);
         let promising = (RIVALLING * removed_share).max(PROMISING);
         let (record, fits) = self.best_of(&before, &predictions, &all, promising, Some(present.loss))?;
         rounds.push(Round { loss_before: before.loss, candidates: record });
@@ -73,8 +75,9 @@ impl Search<'_> {
         let own: f64 = names_at(places, chosen).map(|one| handicap(&one.effect)).product();
         let others = handicap(&law.newest());
         let is_likelier = |named: f64, stated: f64| others * stated < own * named;
-        let is_likelier_overall = is_likelier(present.loss, law.loss);
-        let quieter = without_the_loudest(&present.stretch_losses, &law.stretch_losses);
+        let [named_loss, stated_loss] = [&*present, &law].map(|fitted| fitted.loss_on(bench));
+        let is_likelier_overall = is_likelier(named_loss, stated_loss);
+        let quieter = without_the_loudest(&present.stretch_losses_on(bench), &law.stretch_losses_on(bench));
         if is_likelier_overall
             && quieter.iter().all(|[named, stated]| stated < named)
             && self.is_no_parameter(&before, &law, law.newest_place())?
@@ -88,7 +91,7 @@ impl Search<'_> {
         // A law in place of several effects is no rival of any one of them, and one that a few moments support is none at all.
         if names_at(places, chosen).count() == 1 && !is_likelier_overall {
             let named = &mut chosen[places[0]];
-            let loss = law.loss * named.loss_after / present.loss;
+            let loss = stated_loss * named.loss_after / named_loss;
             named.others.push(Tried { loss, ..law.tried(loss) });
         }
         Ok(false)
@@ -107,6 +110,7 @@ fn imitators(chosen: &[Chosen]) -> Vec<Vec<ActiveEffect>> {
     let are_of_one_part = |one: &ActiveEffect, other: &ActiveEffect| {
         let component = one.descriptor().component;
         component == other.descriptor().component
+            && one.bench == other.bench
             && (component != Component::Sensors || are_of_one_sensor(one, other))
     };
     let mut groups: Vec<Vec<usize>> = Vec::new();

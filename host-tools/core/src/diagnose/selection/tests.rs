@@ -27,6 +27,7 @@ fn fitted((layout, model): (Layout, JointModel)) -> Fitted {
         solution: solution(model, Vec::new()),
         loss: 1.0,
         stretch_losses,
+        benches: vec![0],
         finished: true,
         unseen: false,
     }
@@ -207,7 +208,7 @@ fn what_is_idle_most_of_the_time_shows_and_a_law_as_much_elsewhere_too() {
         let stretch_losses = (0..10).map(|second| ((0, second), [of(second), 10.0])).collect();
         let loss = scale * (0.1 * at_limit + 0.9 * elsewhere);
         let (layout, solution) = (Layout::of(&bench), baseline.clone());
-        Fitted { layout, solution, loss, stretch_losses, finished: true, unseen: false }
+        Fitted { layout, solution, loss, stretch_losses, benches: vec![0], finished: true, unseen: false }
     };
     let name = ActiveEffect::with_defaults(find("sensor_saturation").unwrap());
     let moment = ActiveEffect::with_defaults(find("payload_change").unwrap());

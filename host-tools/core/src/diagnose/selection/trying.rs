@@ -61,7 +61,10 @@ impl Search<'_> {
             let present = Present { believed: self.believed, solution, layout, predictions };
             screen(objective, &present, all, promising, progress)
         };
-        let promising = ranked.iter().filter(|s| s.gain > promising).take(FITTED).count();
+        let (mut ranked, others): (Vec<Screened>, Vec<Screened>) =
+            ranked.into_iter().partition(|screened| screened.gain_there() > promising);
+        let promising = ranked.len().min(FITTED);
+        ranked.extend(others);
         let mut record: Vec<Attempted> =
             ranked.iter().map(|s| Attempted { effect: s.start, promised: s.gain, loss: None }).collect();
         progress.stage("fitting effects", promising as u64);

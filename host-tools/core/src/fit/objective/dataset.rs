@@ -41,6 +41,8 @@ const SAMPLES_AT_ZERO: usize = 20;
 /// The recording.
 #[derive(Clone, Debug)]
 pub(super) struct Dataset {
+    /// Index of its bench.
+    pub(super) bench: u16,
     /// What is different in it; `None` where its joint is the shared one.
     variation: Option<Variation>,
     /// Outputs whose zero is arbitrary.
@@ -246,6 +248,7 @@ impl Dataset {
             .collect();
         let free_offsets = model.free_offsets.clone();
         Ok(Self {
+            bench: 0,
             variation,
             free_offsets,
             input,
