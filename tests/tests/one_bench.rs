@@ -3,51 +3,15 @@
 use bowden_core::diagnose::diagnose;
 use bowden_core::diagnose::verdict::Verdict;
 use bowden_core::progress::Quiet;
-use bowden_core::rig::{Rig, RigDocument, RigParameter};
-use bowden_core::study::{Bench, Role, Study, StudyRecording};
-use bowden_tests::recording_of;
-use virtual_bench::{Case, ConcealedEffect, MotionKind, MotorCoulombFriction, TransmissionBacklash};
-
-/// Length of each recording, s.
-const SECONDS: f64 = 12.0;
-
-/// What every bench has for itself: they are a few per cent off the one rig file, each in its own way.
-const OWN: [&str; 7] = [
-    "tendon.axial_stiffness_n",
-    "tendon.pretension_n",
-    "sheath.friction_coefficient",
-    "pulleys.output_radius_m",
-    "load.mass_kg",
-    "motor.resistance_ohm",
-    "motor.torque_constant_nm_per_a",
-];
-
-/// Benches `left`, `middle` and `right`, which hide these effects.
-fn study(seed: u64, hidden: [Vec<ConcealedEffect>; 3]) -> (Study, String) {
-    let cases: Vec<Case> =
-        hidden.into_iter().zip(seed..).map(|(effects, seed)| Case::new("case", effects, seed, 3.0)).collect();
-    let rig_toml = cases[0].rig_toml();
-    let own: Vec<RigParameter> = OWN.iter().map(|name| RigParameter::parse(name).unwrap()).collect();
-    let bench = |name: &str| Bench {
-        name: name.to_owned(),
-        rig: Rig::parse(&rig_toml, "rig.toml").unwrap(),
-        own: own.clone(),
-    };
-    let recordings = cases.iter().enumerate().map(|(bench, case)| StudyRecording {
-        recording: recording_of(&case.train(MotionKind::Lab, SECONDS).unwrap()),
-        bench,
-        role: Role::Training,
-        set: Vec::new(),
-    });
-    let benches = ["left", "middle", "right"].map(bench).to_vec();
-    (Study { name: "three benches".to_owned(), benches, recordings: recordings.collect() }, rig_toml)
-}
+use bowden_core::rig::{Rig, RigDocument};
+use bowden_tests::studies::study_of;
+use virtual_bench::{MotorCoulombFriction, TransmissionBacklash};
 
 /// Taken for one that all benches have, the play of one takes too little off to be found.
 #[test]
 fn play_of_one_bench_is_found_on_that_bench() {
     let play = TransmissionBacklash { gap_rad: 0.03 };
-    let (study, rig_toml) = study(311, [Vec::new(), vec![play.into()], Vec::new()]);
+    let (study, rig_toml) = study_of(311, [Vec::new(), vec![play.into()], Vec::new()]).unwrap();
     let diagnosed = diagnose(&study, &[], &Quiet).unwrap();
     let diagnosis = &diagnosed.findings.diagnosis;
     println!("{}", diagnosis.summary);
@@ -71,7 +35,7 @@ fn play_of_one_bench_is_found_on_that_bench() {
 #[test]
 fn friction_of_all_benches_is_one_effect() {
     let friction = || vec![MotorCoulombFriction { torque_nm: 0.15, breakaway_rad: 1e-3 }.into()];
-    let (study, _) = study(321, [friction(), friction(), friction()]);
+    let (study, _) = study_of(321, [friction(), friction(), friction()]).unwrap();
     let diagnosis = diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
     println!("{}", diagnosis.summary);
     let [effect] = &diagnosis.effects[..] else { panic!("{:?}", diagnosis.effects) };
@@ -80,7 +44,7 @@ fn friction_of_all_benches_is_one_effect() {
 
 #[test]
 fn benches_that_hide_nothing_have_no_effect_of_their_own() {
-    let (study, _) = study(331, [Vec::new(), Vec::new(), Vec::new()]);
+    let (study, _) = study_of(331, [Vec::new(), Vec::new(), Vec::new()]).unwrap();
     let diagnosis = diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
     println!("{}", diagnosis.summary);
     assert_eq!((diagnosis.verdict, &diagnosis.effects[..]), (Verdict::Consistent, &[][..]));

@@ -1,5 +1,5 @@
 //! `cargo xtask prove`: the concealed-effects benchmark of the diagnosis, and with `--real` recordings of real
-//! benches, with `--direct` joints without tendons.
+//! benches, with `--direct` joints without tendons, with `--studies` studies of three benches.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -21,6 +21,10 @@ pub struct Options {
     /// else can be given
     #[arg(long, conflicts_with = "real")]
     direct: bool,
+    /// Hide effects on some of the three benches of a study instead, and print what is said of each; comes first. `prove --studies --help`
+    /// lists what else can be given
+    #[arg(long, conflicts_with_all = ["real", "direct"])]
+    studies: bool,
     /// With --real: folder of the data sets, instead of ../shared/data
     #[arg(long, value_name = "DIR", requires = "real")]
     data: Option<PathBuf>,
@@ -44,9 +48,12 @@ pub fn run(options: &Options) -> Result<(), String> {
         return run_real(options);
     }
     if options.direct {
-        return run_direct(options);
+        return run_program(options, "direct_drives");
     }
-    for kind in ["--real", "--direct"] {
+    if options.studies {
+        return run_program(options, "studies");
+    }
+    for kind in ["--real", "--direct", "--studies"] {
         if options.handed_on.iter().any(|option| option == kind) {
             return Err(format!("{kind} comes first: `cargo xtask prove {kind} ...`"));
         }
@@ -63,14 +70,14 @@ pub fn run(options: &Options) -> Result<(), String> {
     }
 }
 
-/// Hides effects in joints without tendons.
+/// Runs a program of the tests that hides effects and prints a table.
 ///
 /// # Errors
 /// When something cannot be built, or a diagnosis fails.
-fn run_direct(options: &Options) -> Result<(), String> {
-    let program = ["--package", "bowden-tests", "--bin", "direct_drives"];
-    process::run(cargo(&["build", "--release"]).args(program), &[0])?;
-    let mut command = Command::new(built("release", "direct_drives")?);
+fn run_program(options: &Options, program: &str) -> Result<(), String> {
+    let package = ["--package", "bowden-tests", "--bin", program];
+    process::run(cargo(&["build", "--release"]).args(package), &[0])?;
+    let mut command = Command::new(built("release", program)?);
     process::run(command.args(&options.handed_on), &[0])
 }
 
@@ -175,6 +182,7 @@ mod tests {
         let reason = run(&parsed(&["--quick", "--real"])).unwrap_err();
         assert!(reason.starts_with("--real comes first"), "{reason}");
         assert!(parsed(&["--direct", "--seed", "3"]).direct);
+        assert!(parsed(&["--studies", "--seed", "3"]).studies);
         let reason = run(&parsed(&["--quick", "--direct"])).unwrap_err();
         assert!(reason.starts_with("--direct comes first"), "{reason}");
     }
