@@ -248,14 +248,15 @@ impl Answer {
         let Self { asked, diagnosis, heldout } = self;
         let mut lines = vec![asked.clone(), format!("  {}", diagnosis.summary)];
         for effect in &diagnosis.effects {
-            let on = effect.channel.as_ref().map_or(String::new(), |channel| format!(" on {channel}"));
+            let [on, of] = [("on", &effect.channel), ("of", &effect.bench)]
+                .map(|(word, what)| what.as_ref().map_or(String::new(), |what| format!(" {word} {what}")));
             let values: Vec<String> = effect
                 .parameters
                 .iter()
                 .map(|(name, value)| format!("{name} {}", short(value.value)))
                 .collect();
             lines.push(format!(
-                "  named: {}{on}, probability {:.2}, {}",
+                "  named: {}{on}{of}, probability {:.2}, {}",
                 effect.id,
                 effect.probability,
                 values.join(", ")
