@@ -21,6 +21,7 @@ mod locked;
 mod off_centre;
 mod one_body;
 mod onset;
+mod own_parameters;
 mod place;
 pub mod policy;
 mod regimes;
@@ -58,6 +59,7 @@ pub use experiment::{Experiment, SECONDS as EXPERIMENT_S};
 use hum::Hum;
 pub use hypotheses::Asked;
 use layout::Layout;
+use own_parameters::differing;
 use policy::POLICY;
 use selection::{Attempted, Chosen, Round, Selected, Tried, compare_with_laws, select};
 use stages::{Stage, Stages};
@@ -300,7 +302,12 @@ impl Case<'_> {
             };
         }
         let traces = stages::traces(judge, model, &last.model)?;
-        let left = Left { hums, unexplained };
+        let differing = if selected.complete {
+            differing(objective, &coarse, &at_search_resolution(&selected.model, model))?
+        } else {
+            Vec::new()
+        };
+        let left = Left { hums, unexplained, differing };
         self.report(&selected, &last, &stages, left, traces)
     }
 }
@@ -318,6 +325,8 @@ struct Left {
     /// Hum of sensors, and what is left of the channel on held-out data without and with it.
     hums: Vec<(Hum, [f64; 2])>,
     unexplained: Option<Unexplained>,
+    /// Parameters in which benches differ that are said to share them.
+    differing: Vec<String>,
 }
 
 /// What a diagnosis is about.
@@ -373,14 +382,10 @@ fn refine(
 }
 
 impl Case<'_> {
-    /// A bench after its recordings, whose diagnosed joint is a variation of `diagnosed`.
-    fn now(
-        &self,
-        (bench, variation): &(&Bench, Variation),
-        diagnosed: &JointModel,
-        recalibrated: &[Recalibrated],
-        clock_s: f64,
-    ) -> BenchNow {
+    /// Bench `index` after its recordings; its diagnosed joint is a variation of `diagnosed`.
+    fn now(&self, index: usize, diagnosed: &JointModel, recalibrated: &[Recalibrated]) -> BenchNow {
+        let (bench, variation) = &self.benches[index];
+        let clock_s = self.objective.on(Some(index as u16)).duration_s();
         let joint = variation.apply(diagnosed);
         let stated_effects = variation.base().effects.len();
         let calibrated = Layout::of(self.model).calibrated(self.model);
@@ -447,7 +452,7 @@ impl Case<'_> {
         selected: &Selected,
         last: &Solution,
         stages: &Stages,
-        Left { hums, unexplained }: Left,
+        Left { hums, unexplained, differing }: Left,
         traces: Vec<Trace>,
     ) -> Result<Diagnosed, Failure> {
         let Self { rig, objective, judge, model, .. } = *self;
@@ -510,7 +515,8 @@ impl Case<'_> {
                 experiments.push(found);
                 Some(words)
             };
-            let mut named = named(active, chosen, heldout, &stds[values], objective, separate);
+            let recorded_s = objective.on(active.bench).duration_s();
+            let mut named = named(active, chosen, heldout, &stds[values], recorded_s, separate);
             if let Some(bench) = self.bench_of(&active) {
                 named.sentence = words::on_bench(&bench, &named.sentence);
                 named.bench = Some(bench);
@@ -523,7 +529,7 @@ impl Case<'_> {
         let mismatch = place::mismatch(judge, &stages.recalibrated.residuals);
         let unexplained = stated_laws::unexplained(&laws, unexplained, &mismatch);
         effects.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        let wrong = recalibrated_parameters.iter().any(Recalibrated::is_wrong);
+        let wrong = !differing.is_empty() || recalibrated_parameters.iter().any(Recalibrated::is_wrong);
         let [heldout_loss, training_loss] =
             [Part::HeldOut, Part::Training].map(|part| stages.loss(judge, part));
         let evidence = Evidence {
@@ -550,16 +556,17 @@ impl Case<'_> {
             })
             .collect();
         let by_a_law = !laws.is_empty();
-        let summary =
+        let mut summary =
             words::summary(verdict, &effects, &recalibrated_parameters, by_a_law, &heldout_loss, &compared);
+        summary.push_str(&words::benches_differ(&differing));
         let channels: BTreeMap<String, ChannelFit> =
             compared.into_iter().map(|(series, fit)| (series.name().to_owned(), fit)).collect();
         let coarse = at_search_resolution(&last.model, model);
         let mut indistinguishable =
             crate::fit::identifiability::indistinguishable(objective, &coarse).unwrap_or_default();
-        let benches = self.benches.iter();
+        let benches = 0..self.benches.len();
         let now: Vec<BenchNow> =
-            benches.map(|bench| self.now(bench, &last.model, &recalibrated_parameters, clock_s)).collect();
+            benches.map(|bench| self.now(bench, &last.model, &recalibrated_parameters)).collect();
         for ((bench, _), now) in self.benches.iter().zip(&now) {
             for undecided in &now.undecided {
                 let is_it =
@@ -584,6 +591,7 @@ impl Case<'_> {
             complete: selected.complete,
             effects,
             recalibrated: recalibrated_parameters,
+            differing,
             indistinguishable,
             mismatch,
             residual_map: residual_map::residual_map(judge, stages),
@@ -630,7 +638,7 @@ fn named(
     chosen: &Chosen,
     heldout: [f64; 2],
     stds: &[Option<f64>],
-    objective: &Objective,
+    recorded_s: f64,
     separate: impl FnMut(&Tried) -> Option<String>,
 ) -> NamedEffect {
     let descriptor = active.descriptor();
@@ -655,7 +663,7 @@ fn named(
         further: Vec::new(),
         heldout_improvement,
         training_improvement,
-        sentence: words::sentence(&active, heldout_improvement, objective.duration_s()),
+        sentence: words::sentence(&active, heldout_improvement, recorded_s),
         rivals,
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn between_recordings(
     if !objective.states_conditions() {
         return Ok(false);
     }
-    let running = objective.running_at(effect.parameters[moment]);
+    let running = objective.on(effect.bench).running_at(effect.parameters[moment]);
     let loss = |model: &JointModel| {
         Ok::<f64, Failure>(running.mean_loss(&running.residuals(model)?, Part::Training))
     };

@@ -393,6 +393,9 @@ pub struct Diagnosis {
     pub effects: Vec<NamedEffect>,
     /// Every nominal parameter that was fitted.
     pub recalibrated: Vec<Recalibrated>,
+    /// Parameters in which the benches of a study differ although it says that they share them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub differing: Vec<String>,
     /// Parameters that these data cannot tell apart, each group by `section.name`; a radius may stand beside an effect.
     pub indistinguishable: Vec<Vec<String>>,
     /// Where the recalibrated simulation differs, largest share first.

@@ -240,6 +240,19 @@ pub(super) fn summary(
     said
 }
 
+/// What a summary adds where benches differ in parameters that their study says they share.
+pub(super) fn benches_differ(parameters: &[String]) -> String {
+    let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
+    match names.len() {
+        0 => String::new(),
+        1 => format!(" The benches differ in {}: list it under `own` of each bench in the study.", names[0]),
+        _ => format!(
+            " The benches differ in {}: list them under `own` of each bench in the study.",
+            listed(&names)
+        ),
+    }
+}
+
 /// What a summary adds on a channel that a free run of the diagnosed rig predicts worse than one of the recalibrated rig does.
 fn worse_free_run(series: Series, fit: &ChannelFit) -> Option<String> {
     (fit.free_run && fit.after_rmse > fit.recalibrated_rmse).then(|| {
@@ -255,8 +268,10 @@ fn worse_free_run(series: Series, fit: &ChannelFit) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::{listed, short, summary};
-    use crate::diagnose::verdict::{ChannelFit, Recalibrated, StageLoss, Verdict};
+    use crate::diagnose::verdict::{ChannelFit, NamedEffect, Recalibrated, StageLoss, Verdict};
     use crate::fit::objective::Series;
     use bowden_model::channel::Channel;
 
@@ -325,6 +340,40 @@ mod tests {
             said(5.0).contains(" raises the held-out loss from 4.00 to 5.00 (")
                 && said(5.0).contains("do not confirm this")
         );
+    }
+
+    /// Late tensions of two benches, a spring that all have, and a wrong gain of one bench on two channels.
+    #[test]
+    fn an_effect_is_named_once_with_the_benches_that_have_it() {
+        let on = |id: &str, bench: Option<&str>| NamedEffect {
+            id: id.to_owned(),
+            component: "sensors".to_owned(),
+            probability: 0.9,
+            onset_s: None,
+            channel: None,
+            bench: bench.map(str::to_owned),
+            parameters: BTreeMap::new(),
+            further: Vec::new(),
+            heldout_improvement: 0.5,
+            training_improvement: 0.5,
+            sentence: String::new(),
+            rivals: Vec::new(),
+        };
+        let effects = [
+            on("sensor_lag", Some("left")),
+            on("joint_spring", None),
+            on("sensor_gain_error", Some("left")),
+            on("sensor_lag", Some("right")),
+            on("sensor_gain_error", Some("left")),
+        ];
+        let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 3.9 };
+        let said = summary(Verdict::MissingPhysics, &effects, &[], false, &loss, &[]);
+        let lacks = "The simulation lacks sensor_lag (left, right), joint_spring and sensor_gain_error (left): adding them";
+        assert!(said.starts_with(lacks), "{said}");
+        // The loss of all hardly falls, that of the benches does.
+        assert!(!said.contains("do not confirm this"), "{said}");
+        let shared = summary(Verdict::MissingPhysics, &effects[1..2], &[], false, &loss, &[]);
+        assert!(shared.contains("do not confirm this"), "{shared}");
     }
 
     #[test]

@@ -45,8 +45,8 @@ pub fn typical(model: &JointModel, component: Component, spec: &ParameterSpec) -
     (size * spec.default).clamp(spec.lower, spec.upper)
 }
 
-/// Torques over those of the paper's joint: of a drive by what it can do, behind it by what cables and load bring; dry friction that the
-/// cables have to move is a load.
+/// Torques over those of the paper's joint: of a drive by what it can do, behind it by what cables and load bring; a torque of the joint that
+/// the cables have to overcome, such as the slip of a drum, is a load.
 fn torque(model: &JointModel, component: Component) -> f64 {
     let parameters = &model.parameters;
     let stall = model.strength_nm().map(|strength_nm| strength_nm / STALL_NM);
@@ -61,12 +61,14 @@ fn torque(model: &JointModel, component: Component) -> f64 {
     });
     let weight =
         parameters.load.map_or(0.0, |load| load.mass_kg * GRAVITY_M_S2 * load.arm_m / WEIGHT_TORQUE_NM);
-    let dry = |effect: &ActiveEffect| {
-        let moved = parameters.tendon.is_some() && effect.descriptor().id == "joint_coulomb_friction";
-        if moved { effect.parameters[0] / WEIGHT_TORQUE_NM } else { 0.0 }
+    let overcome = |effect: &ActiveEffect| {
+        let descriptor = effect.descriptor();
+        let is_torque = descriptor.parameters.first().is_some_and(|spec| spec.unit == "N·m");
+        let is_load = parameters.tendon.is_some() && descriptor.component == Component::Joint && is_torque;
+        if is_load { effect.parameters[0].abs() / WEIGHT_TORQUE_NM } else { 0.0 }
     };
-    let friction = model.effects.iter().map(dry).fold(0.0, f64::max);
-    let largest = cables.max(weight).max(friction);
+    let load = model.effects.iter().map(overcome).fold(weight, f64::max);
+    let largest = cables.max(load);
     if largest > 0.0 { largest } else { stall.unwrap_or(0.0) }
 }
 
@@ -100,7 +102,7 @@ mod tests {
 
     /// Slack bands that turn a drum: 5 N·m of slip is nearly seven times the weight of the paper's joint; 0.05 N·m beside a weight is no load.
     #[test]
-    fn dry_friction_that_cables_move_is_a_load() {
+    fn a_torque_that_cables_overcome_is_a_load() {
         let friction = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap());
         let spring_nm_per_rad = |pretension_n: f64, mass_kg: f64, torque_nm: f64| {
             let mut model = bench();

@@ -141,6 +141,7 @@ fn diagnosis() -> Diagnosis {
             recalibrated("motor.rotor_inertia_kg_m2", 1.2e-5, 1.31e-5, Some(2.0e-7), "kg m^2"),
             recalibrated("load.viscous_nm_s_per_rad", 0.02, 0.5, None, "N m s/rad"),
         ],
+        differing: Vec::new(),
         indistinguishable: vec![vec!["sheath.wrap_angle_rad".into(), "sheath.friction_coefficient".into()]],
         mismatch: vec![
             mismatch("transmission", "f2_n", "moving", 21.38, 27.71, 0.413),

@@ -2,7 +2,7 @@
 
 use bowden_model::channel::Channel;
 
-use crate::diagnose::verdict::{Findings, Verdict};
+use crate::diagnose::verdict::{Findings, NamedEffect, Verdict};
 
 /// Identifier as words: `gear_load_friction` becomes `gear load friction`.
 pub fn phrase(id: &str) -> String {
@@ -62,6 +62,17 @@ pub(super) fn component(name: &str) -> String {
     known.into()
 }
 
+/// Identifiers of effects in their order, each once: several benches or sensors may have the same.
+pub(super) fn once_each<'e>(effects: impl IntoIterator<Item = &'e NamedEffect>) -> Vec<&'e str> {
+    let mut ids: Vec<&str> = Vec::new();
+    for effect in effects {
+        if !ids.contains(&effect.id.as_str()) {
+            ids.push(&effect.id);
+        }
+    }
+    ids
+}
+
 /// Verdict as a heading.
 pub(super) fn verdict(findings: &Findings) -> String {
     let diagnosis = &findings.diagnosis;
@@ -72,7 +83,7 @@ pub(super) fn verdict(findings: &Findings) -> String {
             "Unexplained: structure is left that no effect of the catalogue explains".into()
         }
         Verdict::MissingPhysics => {
-            let named: Vec<String> = diagnosis.effects.iter().map(|effect| phrase(&effect.id)).collect();
+            let named: Vec<String> = once_each(&diagnosis.effects).into_iter().map(phrase).collect();
             if named.is_empty() {
                 "Missing physics".into()
             } else {

@@ -65,8 +65,7 @@ fn chain(findings: &Findings) -> Markup {
             @let places: Vec<f64> =
                 diagnosis.mismatch.iter().filter(|m| m.component == part).map(|m| m.share).collect();
             @let share: f64 = places.iter().sum();
-            @let effects: Vec<&str> =
-                diagnosis.effects.iter().filter(|e| e.component == part).map(|e| e.id.as_str()).collect();
+            @let effects = names::once_each(diagnosis.effects.iter().filter(|e| e.component == part));
             @let is_left = left == Some(part);
             li class=(if effects.is_empty() && !is_left { "part" } else { "part named" }) {
                 strong { (names::component(part)) }

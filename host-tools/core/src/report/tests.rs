@@ -111,6 +111,23 @@ fn a_rival_is_shown_by_its_name_and_a_law_by_its_formula() {
 }
 
 #[test]
+fn what_several_benches_have_stands_once_in_the_heading_and_once_for_each() {
+    let mut findings = example::findings(50);
+    let effects = &mut findings.diagnosis.effects;
+    effects.push(effects[2].clone());
+    for (effect, bench) in effects[2..].iter_mut().zip(["left", "right"]) {
+        effect.bench = Some(bench.into());
+    }
+    let text = text_of(&render(&findings));
+    let heading = "Missing physics: wrap angle disturbed, motor Coulomb friction, sensor offset";
+    let end = text.find(heading).expect("the heading") + heading.len();
+    assert!(!text[end..].starts_with(','), "{}", &text[..end + 20]);
+    for bench in ["left", "right"] {
+        assert!(text.contains(&format!("sensor_offset on bench {bench}")), "{bench}");
+    }
+}
+
+#[test]
 fn text_from_files_is_escaped() {
     let hostile = "<script>alert(\"x\")</script>&'";
     let mut findings = example::findings(50);

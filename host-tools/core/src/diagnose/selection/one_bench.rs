@@ -7,10 +7,9 @@ use bowden_model::effect::ActiveEffect;
 
 use super::{Explanation, Fitted, PROMISING, Round, Search, Worth};
 use crate::diagnose::candidates::candidates;
-use crate::diagnose::layout::Layout;
+use crate::diagnose::own_parameters::with_own_parameters;
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
-use crate::joint_model::{JointModel, OwnParameter};
 use crate::outcome::Failure;
 
 impl Search<'_> {
@@ -64,30 +63,15 @@ impl Search<'_> {
     }
 }
 
-/// `model` with values of their own on `bench` for all parameters that a recalibration of `believed` moves.
-fn with_own_parameters(model: &JointModel, believed: &JointModel, bench: u16) -> JointModel {
-    let mut own = model.clone();
-    let bench = usize::from(bench);
-    for free in Layout::of(believed).calibrated(believed) {
-        let Some(parameter) = free.parameter(believed).filter(|parameter| !parameter.is_of_effect()) else {
-            continue;
-        };
-        let has_it = own.own.values.iter().any(|one| one.bench == bench && one.parameter == parameter);
-        if free.bench(believed).is_none() && !has_it {
-            let value = model.value(&parameter);
-            own.own.values.push(OwnParameter { bench, parameter, value });
-        }
-    }
-    own
-}
-
 #[cfg(test)]
 mod tests {
     use bowden_model::effects::find;
 
     use super::super::{Asked, Policy};
     use super::*;
+    use crate::diagnose::layout::Layout;
     use crate::fit::objective::Objective;
+    use crate::joint_model::JointModel;
     use crate::progress::Quiet;
     use crate::study::{Bench, Study, StudyRecording};
     use crate::test_bench;
