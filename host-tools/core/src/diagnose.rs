@@ -556,9 +556,15 @@ impl Case<'_> {
             })
             .collect();
         let by_a_law = !laws.is_empty();
-        let mut summary =
-            words::summary(verdict, &effects, &recalibrated_parameters, by_a_law, &heldout_loss, &compared);
-        summary.push_str(&words::benches_differ(&differing));
+        let summary = words::summary(
+            verdict,
+            &effects,
+            &recalibrated_parameters,
+            &differing,
+            by_a_law,
+            &heldout_loss,
+            &compared,
+        );
         let channels: BTreeMap<String, ChannelFit> =
             compared.into_iter().map(|(series, fit)| (series.name().to_owned(), fit)).collect();
         let coarse = at_search_resolution(&last.model, model);

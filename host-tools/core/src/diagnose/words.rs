@@ -187,21 +187,26 @@ fn listed(items: &[&str]) -> String {
     }
 }
 
-/// Summary of the diagnosis in two or three sentences, and one more for each channel of which a free run got worse.
+/// Summary of the diagnosis in two or three sentences, and one more for each channel of which a free run got worse. In the parameters
+/// `differing` the benches of the study differ.
 pub(super) fn summary(
     verdict: Verdict,
     effects: &[NamedEffect],
     recalibrated: &[Recalibrated],
+    differing: &[String],
     by_a_law: bool,
     heldout_loss: &StageLoss,
     compared: &[(Series, ChannelFit)],
 ) -> String {
     let changed: Vec<String> = recalibrated.iter().filter(|p| p.is_wrong()).map(change).collect();
-    let parameters = if changed.is_empty() {
-        as_stated(recalibrated)
-    } else {
-        format!("Parameters that were wrong: {}.", changed.join(", "))
-    };
+    let mut parameters: Vec<String> = Vec::new();
+    if !changed.is_empty() {
+        parameters.push(format!("Parameters that were wrong: {}.", changed.join(", ")));
+    } else if differing.is_empty() {
+        parameters.push(as_stated(recalibrated));
+    }
+    parameters.extend(benches_differ(differing));
+    let parameters = parameters.join(" ");
     let StageLoss { recalibrated: loss_recalibrated, after: loss_after, .. } = *heldout_loss;
     let changes = if loss_after < loss_recalibrated { "reduces" } else { "raises" };
     let effect = format!(
@@ -240,17 +245,16 @@ pub(super) fn summary(
     said
 }
 
-/// What a summary adds where benches differ in parameters that their study says they share.
-pub(super) fn benches_differ(parameters: &[String]) -> String {
+/// What a summary says where benches differ in parameters that their study says they share.
+fn benches_differ(parameters: &[String]) -> Option<String> {
     let names: Vec<&str> = parameters.iter().map(String::as_str).collect();
-    match names.len() {
-        0 => String::new(),
-        1 => format!(" The benches differ in {}: list it under `own` of each bench in the study.", names[0]),
-        _ => format!(
-            " The benches differ in {}: list them under `own` of each bench in the study.",
+    let them = if names.len() > 1 { "them" } else { "it" };
+    (!names.is_empty()).then(|| {
+        format!(
+            "The benches differ in {}: list {them} under `own` of each bench in the study.",
             listed(&names)
-        ),
-    }
+        )
+    })
 }
 
 /// What a summary adds on a channel that a free run of the diagnosed rig predicts worse than one of the recalibrated rig does.
@@ -288,7 +292,7 @@ mod tests {
             };
             let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 1.0 };
             let compared = [(Series::Channel(Channel::ThetaOut), fit)];
-            summary(Verdict::MissingPhysics, &[], &[], false, &loss, &compared)
+            summary(Verdict::MissingPhysics, &[], &[], &[], false, &loss, &compared)
         };
         let plain = said(0.01, true);
         assert_eq!(
@@ -314,7 +318,7 @@ mod tests {
         let found =
             [recalibrated("load.mass_kg", "kg", 0.0, 0.512), recalibrated("load.arm_m", "m", 0.2, 0.22)];
         let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 4.0 };
-        let said = summary(Verdict::Recalibrate, &[], &found, false, &loss, &[]);
+        let said = summary(Verdict::Recalibrate, &[], &found, &[], false, &loss, &[]);
         assert!(
             said.ends_with("Parameters that were wrong: load.mass_kg 0 to 0.512 kg, load.arm_m +10 %."),
             "{said}"
@@ -326,7 +330,7 @@ mod tests {
     fn a_summary_says_whether_the_held_out_loss_falls_and_whether_that_is_enough() {
         let said = |after: f64| {
             let loss = StageLoss { before: 9.0, recalibrated: 4.0, after };
-            summary(Verdict::Unexplained, &[], &[], true, &loss, &[])
+            summary(Verdict::Unexplained, &[], &[], &[], true, &loss, &[])
         };
         assert!(
             said(1.0).contains("a formula for it reduces the held-out loss from 4.00 to 1.00 (")
@@ -367,13 +371,30 @@ mod tests {
             on("sensor_gain_error", Some("left")),
         ];
         let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 3.9 };
-        let said = summary(Verdict::MissingPhysics, &effects, &[], false, &loss, &[]);
+        let said = summary(Verdict::MissingPhysics, &effects, &[], &[], false, &loss, &[]);
         let lacks = "The simulation lacks sensor_lag (left, right), joint_spring and sensor_gain_error (left): adding them";
         assert!(said.starts_with(lacks), "{said}");
         // The loss of all hardly falls, that of the benches does.
         assert!(!said.contains("do not confirm this"), "{said}");
-        let shared = summary(Verdict::MissingPhysics, &effects[1..2], &[], false, &loss, &[]);
+        let shared = summary(Verdict::MissingPhysics, &effects[1..2], &[], &[], false, &loss, &[]);
         assert!(shared.contains("do not confirm this"), "{shared}");
+    }
+
+    /// It takes the place of the sentence that no parameter is wrong.
+    #[test]
+    fn benches_that_differ_are_told_with_what_to_do() {
+        let loss = StageLoss { before: 9.0, recalibrated: 4.0, after: 4.0 };
+        let said = |differing: &[&str]| {
+            let differing: Vec<String> = differing.iter().map(|name| (*name).to_owned()).collect();
+            summary(Verdict::Recalibrate, &[], &[], &differing, false, &loss, &[])
+        };
+        assert_eq!(
+            said(&["load.mass_kg", "tendon.pretension_n"]),
+            "Parameters were wrong, and no physics is missing. The benches differ in load.mass_kg and tendon.pretension_n: list them under \
+             `own` of each bench in the study."
+        );
+        assert!(said(&["load.mass_kg"]).ends_with("list it under `own` of each bench in the study."));
+        assert!(!said(&[]).contains("differ in"));
     }
 
     #[test]
