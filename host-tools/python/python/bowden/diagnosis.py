@@ -89,6 +89,11 @@ class Diagnosis:
         """Every nominal parameter that was fitted."""
         return read(tuple[Recalibrated, ...], self._data["recalibrated"])
 
+    @property
+    def differing(self) -> tuple[str, ...]:
+        """Parameters in which the benches of a study differ although it says that they share them."""
+        return tuple(self._data.get("differing", ()))
+
     @cached_property
     def mismatch(self) -> tuple[Mismatch, ...]:
         """Where the recalibrated simulation differs, largest share first."""
