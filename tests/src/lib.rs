@@ -4,6 +4,7 @@
 pub mod direct_drives;
 pub mod prove;
 pub mod recovery;
+pub mod rounds;
 pub mod studies;
 
 use std::path::PathBuf;

@@ -77,12 +77,11 @@ pub fn study_of(seed: u64, hidden: [Vec<ConcealedEffect>; 3]) -> Result<(Study, 
     Ok((Study { name, benches: benches.to_vec(), recordings: recordings? }, rig_toml))
 }
 
-/// Study `number` of a round.
+/// The study at `place` of a round, drawn by seed.
 ///
 /// # Errors
 /// When a bench cannot be simulated.
-pub fn drawn(round: u64, number: usize) -> Result<Drawn, Failure> {
-    let seed = 100 * round + number as u64;
+pub fn drawn(seed: u64, place: usize) -> Result<Drawn, Failure> {
     let mut random = Pcg64::new(u128::from(seed), 0x57D1);
     let mut below = |count: usize| Uniform::new(0, count).map_or(0, |uniform| uniform.sample(&mut random));
     let listed: Vec<&'static str> = ConcealedEffect::IDS
@@ -91,11 +90,11 @@ pub fn drawn(round: u64, number: usize) -> Result<Drawn, Failure> {
         .filter(|id| ConcealedEffect::drawn(id, 1.0, 0).is_ok_and(|effect| !effect.is_outside_catalogue()))
         .collect();
     let id = listed[below(listed.len())];
-    let (count, first) = (HIDDEN_ON[number % ROUND], below(BENCHES.len()));
+    let (count, first) = (HIDDEN_ON[place % ROUND], below(BENCHES.len()));
     let mut hidden: [Vec<ConcealedEffect>; 3] = Default::default();
     let mut truth = Vec::new();
-    for place in 0..count {
-        let bench = (first + place) % BENCHES.len();
+    for further in 0..count {
+        let bench = (first + further) % BENCHES.len();
         // What all benches have is of their design, and the same.
         let of_bench = if count == BENCHES.len() { 0 } else { bench as u64 };
         let effect = ConcealedEffect::drawn(id, 1.0, seed + 1000 * of_bench);

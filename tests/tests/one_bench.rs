@@ -48,4 +48,21 @@ fn benches_that_hide_nothing_have_no_effect_of_their_own() {
     let diagnosis = diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
     println!("{}", diagnosis.summary);
     assert_eq!((diagnosis.verdict, &diagnosis.effects[..]), (Verdict::Consistent, &[][..]));
+    assert!(diagnosis.differing.is_empty(), "{:?}", diagnosis.differing);
+}
+
+/// The same benches in a study that says nothing of what each has for itself.
+#[test]
+fn benches_that_are_said_to_share_everything_are_told_what_they_do_not() {
+    let (mut study, _) = study_of(331, [Vec::new(), Vec::new(), Vec::new()]).unwrap();
+    study.benches.iter_mut().for_each(|bench| bench.own.clear());
+    let diagnosis = diagnose(&study, &[], &Quiet).unwrap().findings.diagnosis;
+    println!("{}", diagnosis.summary);
+    assert!(diagnosis.effects.is_empty() && diagnosis.verdict != Verdict::Consistent);
+    assert!(
+        diagnosis.differing.iter().any(|name| name == "tendon.pretension_n"),
+        "{:?}",
+        diagnosis.differing
+    );
+    assert!(diagnosis.summary.contains("The benches differ in "), "{}", diagnosis.summary);
 }
