@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 
 use super::layout::Layout;
 use super::policy::POLICY;
+use super::selection::PATIENCE;
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, solve_in_rounds};
 use crate::joint_model::{JointModel, OwnParameter};
 use crate::outcome::Failure;
 use crate::rig::RigParameter;
-
-/// Optimiser evaluations per parameter and round.
-const PATIENCE: usize = 5;
 
 /// Parameters that a recalibration of `believed` moves on all benches together.
 fn shared(believed: &JointModel) -> Vec<RigParameter> {

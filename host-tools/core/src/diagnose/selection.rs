@@ -50,7 +50,7 @@ const FINALISTS: usize = 3;
 const PROMISING: f64 = 0.08;
 
 /// Optimiser evaluations per parameter and round.
-const PATIENCE: usize = 5;
+pub(super) const PATIENCE: usize = 5;
 
 /// A fitted candidate.
 #[derive(Clone, Debug)]

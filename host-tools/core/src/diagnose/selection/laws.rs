@@ -119,17 +119,16 @@ impl Search<'_> {
             // If a free form has already located a remaining structure, a law of that component needs no more than an effect.
             let left = unexplained(self.objective, None, &now.fit.solution.model)?;
             let before = self.without_exhausted(&now.fit)?;
-            let (record, fits) = self.one_more(&before, Kind::Law, PROMISING)?;
-            rounds.push(Round { loss_before: before.loss, candidates: record });
+            let tried = self.one_more(&before, Kind::Law, PROMISING)?;
             let there = |fitted: &Fitted| {
                 let component = fitted.newest().descriptor().component.name();
                 left.as_ref().is_some_and(|left| left.component == component)
             };
-            let worth: Worth =
-                if fits.first().is_some_and(there) { Policy::worth_naming } else { Policy::worth_stating };
-            let Some((found, with)) = self.found(&before, &now.fit, fits, worth)? else { break };
-            now.chosen.push(found);
-            now.fit = with;
+            let is_there = tried.1.first().is_some_and(there);
+            let worth: Worth = if is_there { Policy::worth_naming } else { Policy::worth_stating };
+            if !self.add_best(&before, tried, now, rounds, worth)? {
+                break;
+            }
             self.prune(now)?;
             // Beside the law an effect may show that is worth little without it.
             self.add_names(now, rounds, Policy::worth_naming_in_doubt)?;

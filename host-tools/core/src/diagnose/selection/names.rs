@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use super::{
-    Chosen, Explanation, FINALISTS, Fitted, Kind, PROMISING, Round, Search, Tried, Worth, instances,
-    is_further, remove,
+    Attempted, Chosen, Explanation, FINALISTS, Fitted, Kind, PROMISING, Round, Search, Tried, Worth,
+    instances, is_further, remove,
 };
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -50,19 +50,32 @@ impl Search<'_> {
     ) -> Result<(), Failure> {
         while now.names() < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(&now.fit)?;
-            let (record, fits) = self.one_more(&before, Kind::Name, PROMISING)?;
-            rounds.push(Round { loss_before: before.loss, candidates: record });
-            let Some((found, with)) = self.found(&before, &now.fit, fits, worth)? else {
+            let tried = self.one_more(&before, Kind::Name, PROMISING)?;
+            if !self.add_best(&before, tried, now, rounds, worth)? {
                 break;
-            };
-            now.chosen.push(found);
-            now.fit = with;
+            }
             self.choose_kind(now)?;
             self.add_instances(now)?;
             self.add_on_other_benches(now, rounds, worth)?;
         }
         self.exchange(now)?;
         if self.progress.interrupted() { Ok(()) } else { self.prune(now) }
+    }
+
+    /// Adds the best of what was tried relative to `before`, if it is selected, and returns whether one was.
+    pub(super) fn add_best(
+        &self,
+        before: &Fitted,
+        (candidates, fits): (Vec<Attempted>, Vec<Fitted>),
+        now: &mut Explanation,
+        rounds: &mut Vec<Round>,
+        worth: Worth,
+    ) -> Result<bool, Failure> {
+        rounds.push(Round { loss_before: before.loss, candidates });
+        let Some((found, with)) = self.found(before, &now.fit, fits, worth)? else { return Ok(false) };
+        now.chosen.push(found);
+        now.fit = with;
+        Ok(true)
     }
 
     /// The best of `fits`, sorted best first and relative to `before`, if it is selected, and its fit with nuisance terms.

@@ -53,11 +53,10 @@ impl Search<'_> {
                 let bench = candidate.starts.first().and_then(|start| start.bench);
                 candidate.starts.push(ActiveEffect { bench, ..effect });
             }
-            let (record, fits) = self.best_of(&before, &predictions, &all, PROMISING, None)?;
-            rounds.push(Round { loss_before: before.loss, candidates: record });
-            let Some((found, with)) = self.found(&before, &now.fit, fits, worth)? else { break };
-            now.chosen.push(found);
-            now.fit = with;
+            let tried = self.best_of(&before, &predictions, &all, PROMISING, None)?;
+            if !self.add_best(&before, tried, now, rounds, worth)? {
+                break;
+            }
         }
         Ok(())
     }
@@ -65,14 +64,17 @@ impl Search<'_> {
 
 #[cfg(test)]
 mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effect::Target;
     use bowden_model::effects::find;
 
     use super::super::{Asked, Policy};
     use super::*;
     use crate::diagnose::layout::Layout;
-    use crate::fit::objective::Objective;
+    use crate::fit::objective::{Objective, Series};
     use crate::joint_model::JointModel;
     use crate::progress::Quiet;
+    use crate::recording::Recording;
     use crate::study::{Bench, Study, StudyRecording};
     use crate::test_bench;
 
@@ -80,17 +82,27 @@ mod tests {
         ActiveEffect::with_defaults(find("transmission_backlash").unwrap()).with("gap_rad", 0.02)
     }
 
-    /// What is found on three benches of one design, each changed before it is recorded.
-    fn found(changes: [fn(&mut JointModel); 3]) -> Explanation {
-        let mut study = Study::of_bench(test_bench::rig(), vec![test_bench::swung(6000)], Vec::new());
+    /// A joint and three benches of it with the same recording.
+    fn swung_on_three(recording: Recording) -> (JointModel, Objective) {
+        let study = three_benches(recording);
+        let model = study.joint().unwrap();
+        let objective = Objective::of(&model, study.observed(&model).unwrap()).unwrap();
+        (model, objective)
+    }
+
+    fn three_benches(recording: Recording) -> Study {
+        let mut study = Study::of_bench(test_bench::rig(), vec![recording], Vec::new());
         for bench in [1, 2] {
-            study.benches.push(Bench {
-                name: format!("bench {bench}"),
-                rig: test_bench::rig(),
-                own: Vec::new(),
-            });
+            let name = format!("bench {bench}");
+            study.benches.push(Bench { name, rig: test_bench::rig(), own: Vec::new() });
             study.recordings.push(StudyRecording { bench, ..study.recordings[0].clone() });
         }
+        study
+    }
+
+    /// What is found on three benches of one design, each changed before it is recorded.
+    fn found(changes: [fn(&mut JointModel); 3]) -> Explanation {
+        let mut study = three_benches(test_bench::swung(6000));
         let model = study.joint().unwrap();
         let joints = changes.map(|change| {
             let mut joint = model.clone();
@@ -145,6 +157,28 @@ mod tests {
         assert_eq!([smaller, larger].map(|effect| effect.bench), [Some(1), Some(2)]);
         assert!((smaller.parameters[0] / 0.02 - 1.0).abs() < 0.03, "{smaller:?}");
         assert!((larger.parameters[0] / 0.04 - 1.0).abs() < 0.03, "{larger:?}");
+    }
+
+    /// The short way of a sensor that drives nothing, and the long one.
+    #[test]
+    fn a_sensor_of_one_bench_is_seen_through_there_alone() {
+        let (model, objective) = swung_on_three(test_bench::swung(1000));
+        let offset = ActiveEffect {
+            target: Target::One(Channel::F2),
+            bench: Some(1),
+            ..ActiveEffect::with_defaults(find("sensor_offset").unwrap())
+        };
+        let predictions = objective.predict(&model).unwrap();
+        let seen = objective.residuals_seen_through(&predictions, offset).unwrap();
+        let simulated = objective.residuals(&JointModel { effects: vec![offset], ..model.clone() }).unwrap();
+        let right = objective.residuals(&model).unwrap();
+        for (k, entry) in objective.entries().enumerate() {
+            assert!((seen.values[k] - simulated.values[k]).abs() < 1e-6, "{entry:?}");
+            let is_changed = (seen.values[k] - right.values[k]).abs() > 1e-3;
+            let is_there = entry.recording == 1 && entry.series == Series::Channel(Channel::F2);
+            assert!(!is_changed || is_there, "{entry:?}");
+        }
+        assert_ne!(seen, right);
     }
 
     #[test]
