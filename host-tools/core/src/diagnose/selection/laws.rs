@@ -32,7 +32,7 @@ impl Search<'_> {
 
     /// Replaces the effects that one bench of several has by one law that predicts its recordings clearly better, for each such bench: errors
     /// of several of its sensors may stand for one thing that acts on all.
-    fn laws_in_place_on_benches(
+    pub(super) fn laws_in_place_on_benches(
         &self,
         now: &mut Explanation,
         rounds: &mut Vec<Round>,

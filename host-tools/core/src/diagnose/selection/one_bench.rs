@@ -67,8 +67,9 @@ mod tests {
     use bowden_model::channel::Channel;
     use bowden_model::effect::Target;
     use bowden_model::effects::find;
+    use bowden_model::law;
 
-    use super::super::{Asked, Policy};
+    use super::super::{Asked, Chosen, Policy};
     use super::*;
     use crate::diagnose::layout::Layout;
     use crate::fit::objective::{Objective, Series};
@@ -102,6 +103,16 @@ mod tests {
 
     /// What is found on three benches of one design, each changed before it is recorded.
     fn found(changes: [fn(&mut JointModel); 3]) -> Explanation {
+        found_by(changes, |search| {
+            let fit =
+                search.fit(Layout::of(search.believed), search.believed, &[COARSE_STEP, FINE_STEP]).unwrap();
+            let mut now = Explanation { fit, chosen: Vec::new() };
+            search.add_names(&mut now, &mut Vec::new(), Policy::worth_naming).unwrap();
+            now
+        })
+    }
+
+    fn found_by(changes: [fn(&mut JointModel); 3], find: impl Fn(&Search) -> Explanation) -> Explanation {
         let mut study = three_benches(test_bench::swung(6000));
         let model = study.joint().unwrap();
         let joints = changes.map(|change| {
@@ -122,10 +133,7 @@ mod tests {
         let objective = Objective::of(&model, study.observed(&model).unwrap()).unwrap();
         let asked = Asked::default();
         let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
-        let fit = search.fit(Layout::of(&model), &model, &[COARSE_STEP, FINE_STEP]).unwrap();
-        let mut now = Explanation { fit, chosen: Vec::new() };
-        search.add_names(&mut now, &mut Vec::new(), Policy::worth_naming).unwrap();
-        now
+        find(&search)
     }
 
     const AS_STATED: fn(&mut JointModel) = |_| {};
@@ -179,6 +187,30 @@ mod tests {
             assert!(!is_changed || is_there, "{entry:?}");
         }
         assert_ne!(seen, right);
+    }
+
+    /// Drag with the square of speed on one bench, for which viscous friction was taken there.
+    #[test]
+    fn a_law_takes_the_place_of_what_one_bench_has() {
+        let drag = |joint: &mut JointModel| {
+            let law = ActiveEffect::with_defaults(law::find("law_joint_friction_by_speed").unwrap());
+            joint.effects.push(law.with("amplitude_nm", 0.15).with("exponent", 2.0));
+        };
+        let found = found_by([AS_STATED, AS_STATED, drag], |search| {
+            let start = (Layout::of(search.believed), search.believed);
+            let nothing = search.fit(start.0, start.1, &[COARSE_STEP, FINE_STEP]).unwrap();
+            let viscous = ActiveEffect::with_defaults(find("joint_viscous_friction").unwrap());
+            let viscous = ActiveEffect { bench: Some(2), ..viscous };
+            let (layout, with) = nothing.layout.with(&nothing.solution.model, viscous);
+            let fit = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+            let chosen = vec![Chosen::newest_of(&fit, &nothing, Vec::new())];
+            let mut now = Explanation { fit, chosen };
+            search.laws_in_place_on_benches(&mut now, &mut Vec::new()).unwrap();
+            now
+        });
+        let [one] = effects(&found) else { panic!("{:?}", effects(&found)) };
+        assert_eq!((one.descriptor().id, one.bench), ("law_joint_friction_by_speed", Some(2)));
+        assert!((one.parameters[1] / 2.0 - 1.0).abs() < 0.1, "{one:?}");
     }
 
     #[test]
