@@ -7,6 +7,7 @@
 //! |---|---|
 //! | power | `a sign(x) abs(x)^p` |
 //! | power by direction | `a (1 + s sign(x)) abs(x)^p` |
+//! | sign | `a sign(x)` |
 //! | wave | `a sin(n x + phase)`; over time `a sin(2 pi f t + phase)` |
 //! | bump | `a exp(-((x - at) / width)^2)` |
 //! | ramp | `a x` |
@@ -84,6 +85,13 @@ impl Law {
     pub const fn formula(&self) -> &'static str {
         self.formula
     }
+
+    /// Whether it is a friction `a` that acts beside the dry friction `F` with the sign of the speed: what moves is held back by `F + a` forwards
+    /// and by `F - a` backwards, and what rests is held as long as it is driven by no more than that. Both are a stick band `[-F, F]` that the
+    /// torque `-a` shifts; a friction that were read off the speed would let go at `F`, stop, and let go again.
+    fn shifts_the_stick_band(&self) -> bool {
+        self.form == Form::Sign && matches!(self.port, Port::MotorFriction | Port::JointFriction)
+    }
 }
 
 impl Effect for Law {
@@ -131,6 +139,10 @@ impl Effect for Law {
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut MotorPort) {
+        if self.shifts_the_stick_band() {
+            port.torque_nm -= p[0];
+            return;
+        }
         let y = self.form.remembered(p, state, self.variable.at_motor(port));
         self.port.add_at_motor(y, port);
     }
@@ -150,6 +162,10 @@ impl Effect for Law {
     }
 
     fn joint(&self, p: &[f64; MAX_PARAMETERS], state: &mut EffectState, port: &mut JointPort) {
+        if self.shifts_the_stick_band() {
+            port.torque_nm -= p[0];
+            return;
+        }
         let y = self.form.remembered(p, state, self.variable.at_joint(port));
         self.port.add_at_joint(y, port);
     }

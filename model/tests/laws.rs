@@ -24,6 +24,8 @@ fn forms_have_the_values_of_their_formulas() {
         (Form::DirectedPower, &[2.0, 3.0, 0.5], -0.5, 0.125),
         (Form::DirectedPower, &[2.0, 3.0, 0.5], 0.5, 0.375),
         (Form::DirectedPower, &[2.0, 1.0, 0.5], 0.0, 0.0),
+        (Form::Sign, &[2.0], -0.5, -2.0),
+        (Form::Sign, &[2.0], 0.0, 0.0),
         (Form::PowerFromOne, &[2.0, 2.0], 0.5, -1.5),
         (Form::Wave, &[2.0, 3.0, 0.5], 0.0, 2.0 * 0.479_425_538_604_203),
         (Form::Oscillation, &[2.0, 0.25, 0.0], 1.0, 2.0),

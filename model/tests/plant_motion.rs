@@ -246,6 +246,38 @@ fn dry_friction_gives_way_then_slides_and_stops_a_swing() {
     }
 }
 
+/// With a friction of 0.3 N·m and a law of 0.1 N·m by the sign of the speed the joint holds from -0.2 to 0.4 N·m, and a swing comes to rest where
+/// its energy is spent against 0.4 N·m forwards and 0.2 N·m backwards.
+#[test]
+fn friction_by_the_sign_of_the_speed_holds_and_slides_by_its_sum_with_dry_friction() {
+    let (dry_nm, more_nm, travel_rad) = (0.3, 0.1, 4e-4);
+    let dry = ActiveEffect::with_defaults(effects::find("joint_coulomb_friction").unwrap())
+        .with("torque_nm", dry_nm)
+        .with("presliding_rad", travel_rad);
+    let law = ActiveEffect::with_defaults(bowden_model::law::find("law_joint_friction_by_sign").unwrap())
+        .with("amplitude_nm", more_nm);
+    for (pushed_nm, slides) in [(0.38, false), (0.43, true), (-0.18, false), (-0.23, true)] {
+        let mut run = Run::new(joint(0.0), &[dry, law], ARM_BEHIND_ANGLE, 5e-4);
+        run.until(3.0, |t| StepInput { external_torque_nm: pushed_nm * t.min(1.0), ..at(0.0) });
+        let turned_rad = run.plant.theta_out_rad();
+        assert_eq!(turned_rad.abs() > travel_rad, slides, "{turned_rad} rad by {pushed_nm} N·m");
+    }
+    for (speed, slip_nm) in [(1.0, dry_nm + more_nm), (-1.0, dry_nm - more_nm)] {
+        let mut run = Run::new(joint(0.0), &[dry, law], ARM_BEHIND_ANGLE, 5e-4);
+        run.plant.set_speed_rad_s(speed);
+        let mut farthest_rad = 0.0_f64;
+        for _ in 0..4000 {
+            run.plant.step(&run.config, &at(0.0), 5e-4);
+            farthest_rad = farthest_rad.max(speed * run.plant.theta_out_rad());
+        }
+        // I v²/2 = τ x - τ_c travel/2 + k x²/2; up to one step at the first speed is lost.
+        let stiffness = STIFFNESS_NM_PER_RAD + WEIGHT_NM;
+        let spent_j = 0.5 * INERTIA_KG_M2 + 0.5 * dry_nm * travel_rad;
+        let want_rad = ((slip_nm * slip_nm + 2.0 * stiffness * spent_j).sqrt() - slip_nm) / stiffness;
+        near("stopping angle", farthest_rad, want_rad, 5e-4);
+    }
+}
+
 /// A joint without weight carries exactly the torque from outside and its own viscous friction, for any mesh, motion and
 /// step, also where the input turns much faster than the joint can follow elastically.
 #[test]

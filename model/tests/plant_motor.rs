@@ -212,6 +212,21 @@ fn motor_friction_holds_below_breakaway() {
     assert!(run.plant.theta_out_rad() > 10.0 * PRESLIDING_RAD, "{} rad", run.plant.theta_out_rad());
 }
 
+/// With 0.03 N·m of a law by the sign of the speed beside 0.08 N·m of dry friction the motor breaks away at 0.11 N·m forwards and 0.05 N·m
+/// backwards: at τ R/(k V) = 1.019 % and 0.463 % duty.
+#[test]
+fn motor_friction_by_the_sign_of_the_speed_moves_both_breakaways() {
+    let dry = ActiveEffect::with_defaults(effects::find("motor_coulomb_friction").unwrap());
+    let law = ActiveEffect::with_defaults(bowden_model::law::find("law_motor_friction_by_sign").unwrap())
+        .with("amplitude_nm", 0.03);
+    for (level, turns) in [(0.0095, false), (0.0110, true), (-0.0042, false), (-0.0052, true)] {
+        let mut run = Run::new(bare_motor(), &[dry, law], MOTOR_AND_ARM, 5e-4);
+        run.until(4.0, |t| duty(level * (0.5 * t).min(1.0)));
+        let turned_rad = run.plant.theta_out_rad().abs();
+        assert_eq!(turned_rad > 4.0 * PRESLIDING_RAD, turns, "{turned_rad} rad at duty {level}");
+    }
+}
+
 /// A motor-driven joint at rest under a constant duty carries the weight: k i = (r1/r2) `T_out` without friction.
 #[test]
 fn motor_carries_the_weight_through_the_cables() {

@@ -15,6 +15,8 @@ pub enum Form {
     EvenPower,
     /// `a (1 + s sign(x)) abs(x)^p`: not the same in both directions, parameters `a`, `p`, `s`.
     DirectedPower,
+    /// `a sign(x)`, parameter `a`.
+    Sign,
     /// `a (abs(x)^p - 1)`: zero at `x = 1`, parameters `a`, `p`.
     PowerFromOne,
     /// `a sin(n x + phase)`, parameters `a`, `n`, `phase`.
@@ -44,10 +46,8 @@ impl Form {
         match self {
             Self::Power => p[0] * pow(x.abs(), p[1]).copysign(x),
             Self::EvenPower => p[0] * pow(x.abs(), p[1]),
-            Self::DirectedPower => {
-                let direction = if x == 0.0 { 0.0 } else { x.signum() };
-                p[0] * (1.0 + p[2] * direction) * pow(x.abs(), p[1])
-            }
+            Self::DirectedPower => p[0] * (1.0 + p[2] * direction(x)) * pow(x.abs(), p[1]),
+            Self::Sign => p[0] * direction(x),
             Self::PowerFromOne => p[0] * (pow(x.abs(), p[1]) - 1.0),
             Self::Wave => p[0] * sin(p[1] * x + p[2]),
             Self::Oscillation => p[0] * sin(2.0 * PI * p[1] * x + p[2]),
@@ -92,7 +92,7 @@ impl Form {
     pub const fn behaviour(self) -> &'static str {
         match self {
             Self::Power | Self::EvenPower => "grows with a power of",
-            Self::DirectedPower => "is not the same for both signs of",
+            Self::DirectedPower | Self::Sign => "is not the same for both signs of",
             Self::PowerFromOne => "changes with a power of",
             Self::Wave => "repeats along",
             Self::Oscillation => "oscillates over",
@@ -103,4 +103,9 @@ impl Form {
             Self::Hysteresis => "remembers the last reversal of",
         }
     }
+}
+
+/// Sign of `x`, 0 at 0.
+fn direction(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
 }

@@ -49,6 +49,13 @@ const TORQUE: ParameterSpec =
     ParameterSpec::linear("amplitude_nm", "N·m", [-100.0, 100.0], 0.05, "amplitude");
 const LOST: ParameterSpec =
     ParameterSpec::linear("amplitude", "1/(N·m)", [-10.0, 10.0], -0.02, "amplitude at 1 N·m");
+const FORWARDS: ParameterSpec = ParameterSpec::linear(
+    "amplitude_nm",
+    "N·m",
+    [-100.0, 100.0],
+    0.05,
+    "half of what more acts in positive direction",
+);
 /// The same of a friction at 1 rad/s, which does not drive.
 const DRAG: ParameterSpec =
     ParameterSpec::linear("amplitude_nm", "N·m", [0.0, 100.0], 0.05, "amplitude at 1 rad/s");
@@ -103,7 +110,7 @@ macro_rules! law {
 }
 
 /// All laws, input to output.
-pub static LAWS: [Law; 32] = [
+pub static LAWS: [Law; 34] = [
     law!(
         "law_motor_friction_by_speed",
         MotorFriction,
@@ -119,6 +126,14 @@ pub static LAWS: [Law; 32] = [
         DirectedPower,
         "amplitude_nm * (1 + asymmetry * sign(omega_in_rad_s)) * abs(omega_in_rad_s)^exponent",
         [DRAG, EXPONENT, ASYMMETRY]
+    ),
+    law!(
+        "law_motor_friction_by_sign",
+        MotorFriction,
+        InputSpeed,
+        Sign,
+        "amplitude_nm * sign(omega_in_rad_s)",
+        [FORWARDS]
     ),
     law!(
         "law_motor_friction_at_a_place",
@@ -271,6 +286,14 @@ pub static LAWS: [Law; 32] = [
         DirectedPower,
         "amplitude_nm * (1 + asymmetry * sign(omega_out_rad_s)) * abs(omega_out_rad_s)^exponent",
         [DRAG, EXPONENT, ASYMMETRY]
+    ),
+    law!(
+        "law_joint_friction_by_sign",
+        JointFriction,
+        JointSpeed,
+        Sign,
+        "amplitude_nm * sign(omega_out_rad_s)",
+        [FORWARDS]
     ),
     law!(
         "law_joint_friction_at_a_place",

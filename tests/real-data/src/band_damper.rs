@@ -36,7 +36,7 @@ pub const DIAGNOSED_LIMIT_N: f64 = 1790.0;
 const RIG: RigFile = rig_file!("../../host-tools/studies/band-friction-damper/damper.toml");
 
 /// N·m of the rig per newton of the recording.
-const TORQUE_NM_PER_N: f64 = 5e-4;
+pub const TORQUE_NM_PER_N: f64 = 5e-4;
 
 /// Newtons of a cable of the rig per newton of a band end.
 const CABLE_N_PER_N: f64 = 0.2;

@@ -362,7 +362,7 @@ pub fn report(data: &Path, mut print: impl FnMut(String)) -> Result<Vec<Mark>, F
     print(table.to_string());
 
     let study = RealStudy::load("davinci-cable-tool", &data.join(FOLDER))?;
-    let [tools, _] = answers(&[study.clone(), study.of_bench("T4L_2")?], &mut print)?;
+    let [tools, _] = answers(&[study.clone(), study.of_benches(&["T4L_2"])?], &mut print)?;
     let total = pooled(all);
     Ok(vec![
         Mark {

@@ -261,7 +261,7 @@ pub fn named_friction_nm(diagnosis: &Diagnosis, speed_rad_s: f64, torque_nm: f64
 /// When the data set is missing or unusable.
 pub fn studies(data: &Path) -> Result<[RealStudy; 3], Failure> {
     let study = RealStudy::load(FOLDER, &data.join(FOLDER))?;
-    let alone = |bench| study.clone().of_bench(bench);
+    let alone = |bench| study.clone().of_benches(&[bench]);
     Ok([alone("swing-up")?, alone("position-loop")?, study])
 }
 

@@ -73,21 +73,24 @@ impl RealStudy {
         Ok(self)
     }
 
-    /// The same with one bench alone.
+    /// The same with these benches alone.
     ///
     /// # Errors
     /// When there is no such bench.
-    pub fn of_bench(mut self, name: &str) -> Result<Self, Failure> {
-        let index = self.loaded.study.benches.iter().position(|bench| bench.name == name);
-        let index = index.ok_or_else(|| self.lacks("bench", name))?;
+    pub fn of_benches(mut self, names: &[&str]) -> Result<Self, Failure> {
+        let place = |name: &&str| {
+            let found = self.loaded.study.benches.iter().position(|bench| bench.name == *name);
+            found.ok_or_else(|| self.lacks("bench", name))
+        };
+        let kept: Vec<usize> = names.iter().map(place).collect::<Result<_, _>>()?;
         let LoadedStudy { study, documents, .. } = &mut self.loaded;
-        study.benches = vec![study.benches.swap_remove(index)];
-        *documents = vec![documents.swap_remove(index)];
-        study.recordings.retain(|listed| listed.bench == index);
+        study.benches = kept.iter().map(|bench| study.benches[*bench].clone()).collect();
+        *documents = kept.iter().map(|bench| documents[*bench].clone()).collect();
+        study.recordings.retain(|listed| kept.contains(&listed.bench));
         for listed in &mut study.recordings {
-            listed.bench = 0;
+            listed.bench = kept.iter().position(|bench| *bench == listed.bench).unwrap_or_default();
         }
-        self.asked = format!("{}, bench {name} alone", self.asked);
+        self.asked = format!("{}, bench {} alone", self.asked, names.join(" and "));
         Ok(self)
     }
 
@@ -331,8 +334,8 @@ mod tests {
             (names.as_slice(), judged.size()),
             (&["xl330_kp400_sin_sin_10h29m14".to_owned()][..], [1, 11])
         );
-        assert_eq!(servo().of_bench("xl330").unwrap().size(), [1, 11]);
-        let refused = [servo().judged_by("ddp"), servo().of_bench("ddp")];
+        assert_eq!(servo().of_benches(&["xl330"]).unwrap().size(), [1, 11]);
+        let refused = [servo().judged_by("ddp"), servo().of_benches(&["ddp"])];
         let reasons = refused.map(|refused| refused.unwrap_err().to_string());
         let asked = "bowden diagnose studies/xl330-pendulum/study.toml";
         assert_eq!(reasons, [format!("{asked}: no recording ddp"), format!("{asked}: no bench ddp")]);

@@ -6,6 +6,7 @@
 
 use std::path::PathBuf;
 
+use bowden_core::diagnose::verdict::FoundLaw;
 use bowden_real_data::study::RealStudy;
 use bowden_real_data::{Mark, band_damper, cable_tool, cogging_motor, direct_drive, mean, servo_pendulum};
 
@@ -228,5 +229,31 @@ fn the_hysteresis_of_a_band_damper_is_predicted_from_its_displacement() {
         let expected = if shown.name.starts_with("d1__") { 40.0..50.0 } else { 0.0..8.0 };
         assert!(expected.contains(&late_ms), "{}: {late_ms}", shown.name);
         assert!((1.85..2.05).contains(&lever.ratio), "{}: {}", shown.name, lever.ratio);
+    }
+}
+
+/// The drum of these two runs slips at other forces forwards and backwards, by what the medians of the friction force show without a model.
+#[test]
+fn slip_of_a_damper_that_differs_with_the_direction_is_a_law_of_its_sign() {
+    let Some(data) = data(band_damper::FOLDER) else { return };
+    let shown = band_damper::shown(&data).unwrap();
+    let study = RealStudy::load(band_damper::FOLDER, &data.join(band_damper::FOLDER)).unwrap();
+    let answer = study.of_benches(&["run-6", "run-7"]).unwrap().diagnose().unwrap();
+    println!("{}", answer.said());
+    assert!(answer.diagnosis.effects.is_empty(), "{}", answer.said());
+    assert_eq!(answer.diagnosis.laws.len(), 2, "{}", answer.said());
+    for (bench, recording) in [
+        ("run-6", "d2__char__0.25Hz36lbtension1amplitude"),
+        ("run-7", "d3__char__0.5Hz30lbtension0.5amplitude"),
+    ] {
+        let of_bench = |law: &&FoundLaw| law.bench.as_deref() == Some(bench);
+        let law = answer.diagnosis.laws.iter().find(of_bench).unwrap();
+        assert_eq!(law.port, "joint_friction_nm", "{}", law.sentence);
+        assert_eq!(law.formula, "amplitude_nm * sign(omega_out_rad_s)", "{}", law.sentence);
+        let one = shown.iter().find(|one| one.name == recording).unwrap();
+        let [forwards, backwards] = one.sliding.map(|sliding| sliding.unwrap().friction_n);
+        let shown_nm = 0.5 * (forwards + backwards) * band_damper::TORQUE_NM_PER_N;
+        let ratio = law.coefficients["amplitude_nm"].value / shown_nm;
+        assert!((0.65..1.35).contains(&ratio), "{bench}: {ratio} of {shown_nm} N·m");
     }
 }

@@ -51,10 +51,11 @@ struct Ground<'a> {
     frequencies_hz: Vec<f64>,
 }
 
-/// All laws that the parts of `model` can have and that it does not contain yet. `predictions` are those of the model with all
-/// that was found.
+/// All laws that the parts of `model` can have and that it does not contain yet, of all benches or of one. `predictions` are those of the
+/// model with all that was found.
 #[must_use]
 pub(super) fn law_candidates(
+    bench: Option<u16>,
     model: &JointModel,
     objective: &Objective,
     predictions: &[Prediction],
@@ -78,11 +79,12 @@ pub(super) fn law_candidates(
             let contained = model.effects.iter().any(|active| {
                 law::of(active).is_some_and(|other| other.port() == law.port() && other.form() == law.form())
                     && active.target.overlaps(target)
+                    && bench.is_none_or(|bench| active.is_on(bench))
             });
             if contained {
                 continue;
             }
-            let starts = ground.starts(law, ActiveEffect { target, ..sized(model, law) });
+            let starts = ground.starts(law, ActiveEffect { target, bench, ..sized(model, law) });
             found.extend(
                 apart(law.form(), starts)
                     .into_iter()
@@ -110,7 +112,7 @@ fn apart(form: Form, starts: Vec<ActiveEffect>) -> [Vec<ActiveEffect>; 2] {
 impl Ground<'_> {
     fn starts(&self, law: &Law, base: ActiveEffect) -> Vec<ActiveEffect> {
         match law.form() {
-            Form::Ramp | Form::Square => vec![base],
+            Form::Ramp | Form::Square | Form::Sign => vec![base],
             Form::SignedSquare => {
                 let start = |strength_nm| base.with("amplitude", -MISSING_AT_STALL / strength_nm);
                 self.strength_nm.map(start).into_iter().collect()

@@ -51,8 +51,7 @@ impl Search<'_> {
             let removed_share = 1.0 - present.loss_on(Some(bench)) / before.loss_on(Some(bench));
             let predictions = self.objective.predict(&before.solution.model)?;
             let (objective, seen) = seen_on(bench, self.objective, &predictions);
-            let mut all = law_candidates(&before.without_ordinary(), &objective, &seen);
-            all.iter_mut().flat_map(|law| &mut law.starts).for_each(|start| start.bench = Some(bench));
+            let all = law_candidates(Some(bench), &before.without_ordinary(), &objective, &seen);
             let promising = (RIVALLING * removed_share).max(PROMISING);
             let (record, fits) = self.best_of(&before, &predictions, &all, promising, None)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });

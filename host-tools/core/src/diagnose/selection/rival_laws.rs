@@ -64,9 +64,8 @@ impl Search<'_> {
         let bench = chosen[places[0]].effect.bench;
         let removed_share = 1.0 - present.loss_on(bench) / before.loss_on(bench);
         let predictions = self.objective.predict(&before.solution.model)?;
-        let mut all = law_candidates(&before.without_ordinary(), self.objective, &predictions);
+        let mut all = law_candidates(bench, &before.without_ordinary(), self.objective, &predictions);
         all.retain(|candidate| places.iter().all(|place| can_replace(candidate, &chosen[*place].effect)));
-        all.iter_mut().flat_map(|candidate| &mut candidate.starts).for_each(|law| law.bench = bench);
         let promising = (RIVALLING * removed_share).max(PROMISING);
         let (record, fits) = self.best_of(&before, &predictions, &all, promising, Some(present.loss))?;
         rounds.push(Round { loss_before: before.loss, candidates: record });

@@ -39,7 +39,7 @@ impl Search<'_> {
                 all.extend(self.asked.candidates(&model));
                 all
             }
-            Kind::Law => law_candidates(&model, self.objective, &predictions),
+            Kind::Law => law_candidates(None, &model, self.objective, &predictions),
         };
         self.best_of(present, &predictions, &all, promising, None)
     }
