@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod direct_drives;
+pub mod other_benches;
 pub mod prove;
 pub mod recovery;
 pub mod rounds;

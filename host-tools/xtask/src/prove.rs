@@ -1,5 +1,5 @@
 //! `cargo xtask prove`: the concealed-effects benchmark of the diagnosis, and with `--real` recordings of real
-//! benches, with `--direct` joints without tendons, with `--studies` studies of three benches.
+//! benches, with `--direct` joints without tendons, with `--studies` studies of three benches, with `--benches` benches of other sizes.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -12,6 +12,7 @@ use crate::process::{self, built, cargo, shared, target_folder, workspace};
 /// What is handed on to the benchmark, or to what scores real recordings.
 #[derive(Debug, Args)]
 #[command(disable_help_flag = true)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Options {
     /// Score and diagnose recordings of real benches instead, and write real-recordings.md; comes first.
     /// `prove --real --help` lists what else can be given
@@ -25,6 +26,10 @@ pub struct Options {
     /// lists what else can be given
     #[arg(long, conflicts_with_all = ["real", "direct"])]
     studies: bool,
+    /// Hide effects in benches of other sizes and proportions instead, and print what is said of each; comes first. `prove --benches --help`
+    /// lists what else can be given
+    #[arg(long, conflicts_with_all = ["real", "direct", "studies"])]
+    benches: bool,
     /// With --real: folder of the data sets, instead of ../shared/data
     #[arg(long, value_name = "DIR", requires = "real")]
     data: Option<PathBuf>,
@@ -53,7 +58,10 @@ pub fn run(options: &Options) -> Result<(), String> {
     if options.studies {
         return run_program(options, "studies");
     }
-    for kind in ["--real", "--direct", "--studies"] {
+    if options.benches {
+        return run_program(options, "other_benches");
+    }
+    for kind in ["--real", "--direct", "--studies", "--benches"] {
         if options.handed_on.iter().any(|option| option == kind) {
             return Err(format!("{kind} comes first: `cargo xtask prove {kind} ...`"));
         }
@@ -183,6 +191,7 @@ mod tests {
         assert!(reason.starts_with("--real comes first"), "{reason}");
         assert!(parsed(&["--direct", "--seed", "3"]).direct);
         assert!(parsed(&["--studies", "--seed", "3"]).studies);
+        assert!(parsed(&["--benches", "--seed", "3"]).benches);
         let reason = run(&parsed(&["--quick", "--direct"])).unwrap_err();
         assert!(reason.starts_with("--direct comes first"), "{reason}");
     }

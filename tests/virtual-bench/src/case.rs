@@ -93,7 +93,17 @@ const HELDOUT_SEED: u64 = 0x6865_6c64;
 impl Case {
     /// A nominal bench `percent` off (see [`BenchConfig::perturbed`]) that conceals `effects`.
     pub fn new(name: &str, effects: Vec<ConcealedEffect>, seed: u64, percent: f64) -> Self {
-        let mut nominal = BenchConfig::default();
+        Self::of_bench(name, BenchConfig::default(), effects, seed, percent)
+    }
+
+    /// The same of a bench of which the user believes `nominal`.
+    pub fn of_bench(
+        name: &str,
+        mut nominal: BenchConfig,
+        effects: Vec<ConcealedEffect>,
+        seed: u64,
+        percent: f64,
+    ) -> Self {
         for effect in &effects {
             effect.prepare(&mut nominal);
         }

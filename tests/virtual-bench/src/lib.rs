@@ -80,6 +80,7 @@ mod record;
 mod recording;
 mod sensors;
 mod sheath;
+mod size;
 mod tendon;
 
 pub use case::{Case, Parameter};
@@ -91,3 +92,4 @@ pub use live::{Bridge, LiveBench};
 pub use motion::{Motion, MotionKind};
 pub use record::{Drive, record, record_driven};
 pub use recording::Recording;
+pub use size::Size;

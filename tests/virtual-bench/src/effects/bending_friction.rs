@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Tension-independent part of the sheath friction: the tendon presses on the bends because it is stiff.
 ///
@@ -19,6 +20,10 @@ impl Describe for BendingFriction {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { force_n: 2.0 * strength * draw.uniform(0.85, 1.2) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.force_n *= size.force;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

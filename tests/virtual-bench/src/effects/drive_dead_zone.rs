@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Dead zone of the drive with a soft knee.
 ///
@@ -20,6 +21,10 @@ impl Describe for DriveDeadZone {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { width: 0.018 * strength * draw.uniform(0.85, 1.2) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.width *= size.duty;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

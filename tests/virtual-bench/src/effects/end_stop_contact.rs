@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Rubber stop (Hunt-Crossley): `torque = −k·d^1.5·(1 + damping·dd/dt)`, d the depth, never pulling.
 ///
@@ -30,6 +31,10 @@ impl Describe for EndStopContact {
             stiffness_nm_per_rad_1_5: 10.0 * strength * draw.uniform(0.85, 1.2),
             damping_s_per_rad: draw.uniform(0.1, 0.4),
         }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.stiffness_nm_per_rad_1_5 *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

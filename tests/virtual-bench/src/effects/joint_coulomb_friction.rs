@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 use crate::bristle::ShaftBristle;
 
 /// Dry friction of the joint: a bristle whose steady torque is `torque_nm · sign(omega)`.
@@ -20,6 +21,10 @@ impl Describe for JointCoulombFriction {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { torque_nm: 0.07 * strength * draw.uniform(0.85, 1.2), breakaway_rad: draw.uniform(1e-3, 3e-3) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.torque_nm *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Spring at the joint: `−k·d·(1 + hardening·d²)`, d = `theta_out` − rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +26,10 @@ impl Describe for JointSpring {
             hardening_per_rad2: draw.uniform(0.0, 0.4),
             rest_rad: draw.uniform(-0.05, 0.05),
         }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.stiffness_nm_per_rad *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

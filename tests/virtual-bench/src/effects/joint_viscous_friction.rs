@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Extra viscous friction of the joint: `torque = coefficient · omega`.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +18,10 @@ impl Describe for JointViscousFriction {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { coefficient_nm_s_per_rad: 0.09 * strength * draw.uniform(0.85, 1.2) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.coefficient_nm_s_per_rad *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use crate::config::BenchConfig;
 use crate::draw::Draw;
 use crate::error::BenchError;
+use crate::size::Size;
 
 /// Part of the bench that an effect sits in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -83,6 +84,9 @@ pub(crate) trait Describe: Sized {
     /// An instance of `strength`, secondary parameters from `draw`.
     fn drawn(strength: f64, draw: &mut Draw) -> Self;
 
+    /// Makes an effect that is drawn for the nominal bench one that matters as much on a bench of another size.
+    fn resize(&mut self, _size: &Size) {}
+
     /// Names (with unit) and values for the truth record.
     fn parameters(&self) -> Vec<(&'static str, Value)>;
 
@@ -153,6 +157,13 @@ macro_rules! effects {
                     $(stringify!($id) => Ok(Self::$name($name::drawn(strength, &mut draw))),)+
                     _ => Err(BenchError::UnknownEffect { got: id.to_owned() }),
                 }
+            }
+
+            /// The same for a bench of another size than the nominal one.
+            #[must_use]
+            pub fn sized(mut self, size: &Size) -> Self {
+                match &mut self { $(Self::$name(effect) => effect.resize(size),)+ }
+                self
             }
 
             /// Id as in the catalogue.

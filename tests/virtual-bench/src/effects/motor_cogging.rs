@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 use std::f64::consts::PI;
 
@@ -33,6 +34,10 @@ impl Describe for MotorCogging {
             second_harmonic: draw.uniform(0.0, 0.25),
             third_harmonic: 0.0,
         }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.amplitude_nm *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 use crate::bristle::ShaftBristle;
 
 /// Dry friction at the input shaft that is higher near standstill.
@@ -32,6 +33,11 @@ impl Describe for MotorStribeckFriction {
             stribeck_rad_per_s: draw.uniform(0.05, 0.15),
             breakaway_rad: draw.uniform(1e-3, 3e-3),
         }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.coulomb_nm *= size.torque;
+        self.static_nm *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 use super::smooth_step;
 
 /// Mass at the arm changes by `change_kg` at `onset_s`, within 0.1 s, and stays so in later recordings.
@@ -20,6 +21,10 @@ impl Describe for PayloadChange {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { change_kg: (0.5 * strength * draw.uniform(0.85, 1.2) * draw.sign()).max(-1.5), onset_s: draw.uniform(8.0, 28.0) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.change_kg *= size.mass;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Channel, Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Reading `value + offset` of one channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,14 @@ impl Describe for SensorOffset {
             (Channel::ThetaOut, 0.02),
         ]);
         Self { channel, offset: scale * strength * draw.uniform(0.85, 1.2) * draw.sign() }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.offset *= match self.channel {
+            Channel::ThetaIn | Channel::ThetaOut => 1.0,
+            Channel::Current => size.current,
+            _ => size.force,
+        };
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Stribeck curve of the sheath contact: `mu · (1 + (ratio − 1)/(1 + (v/stribeck)²))`, rational, not the usual exponential.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,10 @@ impl Describe for SheathStribeckFriction {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { static_ratio: 1.0 + 0.8 * strength * draw.uniform(0.85, 1.2), stribeck_m_per_s: draw.uniform(1.5e-3, 4e-3) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.stribeck_m_per_s *= size.radius;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

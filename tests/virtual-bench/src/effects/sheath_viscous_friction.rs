@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Drag of a tendon in its lubricant, spread evenly over the sheath: `coefficient · v/(1 + |v|/thinning)`.
 ///
@@ -21,6 +22,11 @@ impl Describe for SheathViscousFriction {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { coefficient_ns_per_m: 80.0 * strength * draw.uniform(0.85, 1.2), thinning_m_per_s: draw.uniform(0.2, 0.5) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.coefficient_ns_per_m *= size.force / size.radius;
+        self.thinning_m_per_s *= size.radius;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

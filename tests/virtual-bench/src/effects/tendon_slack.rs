@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::{Component, Describe};
 use crate::config::BenchConfig;
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Tension stays at 0 when the tendon is longer than its path; the kink between is a parabola within `±softness_n`.
 ///
@@ -22,6 +23,11 @@ impl Describe for TendonSlack {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { softness_n: draw.uniform(0.3, 0.8), nominal_pretension_n: 30.0 / (1.0 + 2.0 * strength * draw.uniform(0.85, 1.2)) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.softness_n *= size.force;
+        self.nominal_pretension_n *= size.force;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

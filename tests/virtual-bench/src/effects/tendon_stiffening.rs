@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Stiffness that depends on stretch: `k·(1 + s·e/sqrt(e² + e0²))`, e the stretch beyond pretension.
 ///
@@ -21,6 +22,10 @@ impl Describe for TendonStiffening {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { excess: (0.45 * strength * draw.uniform(0.85, 1.2)).min(0.9), knee_n: draw.uniform(8.0, 15.0) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.knee_n *= size.force;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

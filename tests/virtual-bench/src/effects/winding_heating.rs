@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Temperature coefficient of copper's resistance \[1/K\].
 const COPPER_PER_K: f64 = 0.0039;
@@ -24,6 +25,10 @@ impl Describe for WindingHeating {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { thermal_resistance_k_per_w: 180.0 * strength * draw.uniform(0.85, 1.2), time_constant_s: draw.uniform(10.0, 20.0) }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.thermal_resistance_k_per_w /= size.power;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

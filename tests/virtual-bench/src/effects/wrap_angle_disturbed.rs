@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 use super::smooth_step;
 
 /// Length of a flank \[s\].
@@ -29,6 +30,10 @@ impl Describe for WrapAngleDisturbed {
             onset_s: draw.uniform(8.0, 22.0),
             length_s: draw.uniform(5.0, 10.0),
         }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.change_rad *= size.wrap_angle;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Joint angle beyond which the sheath hardly follows \[rad\].
 const SATURATION_RAD: f64 = 1.5;
@@ -22,6 +23,10 @@ impl Describe for WrapAngleVariesWithPose {
 
     fn drawn(strength: f64, draw: &mut Draw) -> Self {
         Self { slope: 1.3 * strength * draw.uniform(0.85, 1.2) * draw.sign() }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.slope *= size.wrap_angle;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

@@ -1,0 +1,186 @@
+//! Benches of other sizes and proportions than the nominal one, each with its own rig file: one effect hidden in each, or none.
+
+use std::fmt::Write;
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::Path;
+
+use bowden_core::diagnose::diagnose;
+use bowden_core::diagnose::verdict::{Diagnosis, Verdict};
+use bowden_core::outcome::Failure;
+use bowden_core::progress::Quiet;
+use bowden_core::rig::Rig;
+use bowden_core::study::Study;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+use virtual_bench::{BenchConfig, Case, ConcealedEffect, MotionKind, Size};
+
+use crate::recording_of;
+
+/// Length of the recording that is learned from, and of the one of another motion that judges, s.
+const TRAINING_S: f64 = 40.0;
+const HELDOUT_S: f64 = 20.0;
+
+/// Standard deviation, in per cent, by which stiffness and pretension of every bench are off its rig file.
+const PERTURBED_PERCENT: f64 = 3.0;
+
+/// Benches of a round, and how many of them hide nothing.
+pub const ROUND: usize = 12;
+const NOTHING: usize = 3;
+
+/// Its limit is set by what the motion of the nominal bench reaches.
+const OF_THE_NOMINAL_BENCH: &str = "sensor_saturation";
+
+/// The bench at `place` of the round, with what it hides.
+///
+/// # Errors
+/// When the virtual bench does not know an effect.
+pub fn drawn(seed: u64, place: usize) -> Result<Case, Failure> {
+    let bench = BenchConfig::drawn(seed);
+    let mut hidden = Vec::new();
+    if place % ROUND < ROUND - NOTHING {
+        let listed: Vec<&str> = ConcealedEffect::IDS
+            .iter()
+            .copied()
+            .filter(|id| *id != OF_THE_NOMINAL_BENCH)
+            .filter(|id| {
+                ConcealedEffect::drawn(id, 1.0, 0).is_ok_and(|effect| !effect.is_outside_catalogue())
+            })
+            .collect();
+        let mut random = Pcg64::new(u128::from(seed), 0xBE9C);
+        let id = listed[Uniform::new(0, listed.len()).map_or(0, |uniform| uniform.sample(&mut random))];
+        let effect = ConcealedEffect::drawn(id, 1.0, seed).map_err(Failure::failed)?;
+        hidden.push(effect.sized(&Size::of(&bench)));
+    }
+    Ok(Case::of_bench("bench", bench, hidden, seed, PERTURBED_PERCENT))
+}
+
+/// A bench and what a diagnosis says of it.
+#[derive(Clone, Debug)]
+pub struct Examined {
+    /// The bench with what it hides.
+    pub case: Case,
+    /// What is said.
+    pub diagnosis: Diagnosis,
+}
+
+/// The recording that is learned from, and that of another motion.
+fn recorded(case: &Case) -> Result<[virtual_bench::Recording; 2], Failure> {
+    let training = case.train(MotionKind::Lab, TRAINING_S).map_err(Failure::failed)?;
+    let heldout = case.heldout(MotionKind::LabHeldout, HELDOUT_S, TRAINING_S).map_err(Failure::failed)?;
+    Ok([training, heldout])
+}
+
+/// Writes the files of a bench into a folder, which is made: rig file, `train.csv`, `heldout.csv` and `truth.json`.
+///
+/// # Errors
+/// When the bench cannot be simulated or a file cannot be written.
+pub fn write(case: &Case, folder: &Path) -> Result<(), Failure> {
+    let failed = |error: io::Error| Failure::failed(format!("{}: {error}", folder.display()));
+    fs::create_dir_all(folder).map_err(failed)?;
+    for (name, text) in [("rig.toml", case.rig_toml()), ("truth.json", case.truth_json())] {
+        fs::write(folder.join(name), text).map_err(failed)?;
+    }
+    for (name, recording) in ["train.csv", "heldout.csv"].iter().zip(recorded(case)?) {
+        let file = File::create(folder.join(name)).map_err(failed)?;
+        recording.write_csv(BufWriter::new(file)).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Records a bench and diagnoses the recordings.
+///
+/// # Errors
+/// When the bench cannot be simulated, and as [`diagnose`].
+pub fn examine(case: Case) -> Result<Examined, Failure> {
+    let rig = Rig::parse(&case.rig_toml(), "rig.toml")?;
+    let [training, heldout] = recorded(&case)?.map(|recorded| recording_of(&recorded));
+    let study = Study::of_bench(rig, vec![training], vec![heldout]);
+    let diagnosis = diagnose(&study, &[], &Quiet)?.findings.diagnosis;
+    Ok(Examined { case, diagnosis })
+}
+
+impl Examined {
+    /// What is hidden, if anything is.
+    #[must_use]
+    pub fn hidden(&self) -> Option<&'static str> {
+        self.case.effects.first().map(ConcealedEffect::id)
+    }
+
+    /// Whether exactly what is hidden was named, and nothing else stated.
+    #[must_use]
+    pub fn is_right(&self) -> bool {
+        let named = self.diagnosis.effects.iter().map(|effect| effect.id.as_str());
+        let is_quiet = self.hidden().is_some()
+            || matches!(self.diagnosis.verdict, Verdict::Consistent | Verdict::Recalibrate);
+        named.eq(self.hidden()) && self.diagnosis.laws.is_empty() && is_quiet
+    }
+
+    /// Whether something is named, or a law stated, that the bench does not hide.
+    #[must_use]
+    pub fn is_false(&self) -> bool {
+        let hidden = self.hidden();
+        self.diagnosis.effects.iter().any(|effect| Some(effect.id.as_str()) != hidden)
+            || !self.diagnosis.laws.is_empty()
+    }
+
+    /// What was said, in short.
+    #[must_use]
+    pub fn said(&self) -> String {
+        let effects = self.diagnosis.effects.iter();
+        let mut said: Vec<String> = effects
+            .map(|one| {
+                let channel =
+                    one.channel.as_ref().map_or_else(String::new, |channel| format!(" on {channel}"));
+                format!("{}{channel} {:.0} %", one.id, 100.0 * one.probability)
+            })
+            .collect();
+        said.extend(self.diagnosis.laws.iter().map(|law| format!("{} = {}", law.port, law.formula)));
+        if said.is_empty() {
+            let is_open = self.diagnosis.verdict == Verdict::Unexplained;
+            said.push(if is_open { "unexplained" } else { "nothing" }.to_owned());
+        }
+        said.join(", ")
+    }
+}
+
+/// Table of a run, and how many are right.
+#[must_use]
+pub fn table(examined: &[(u64, Examined)]) -> String {
+    let mut text = format!(
+        "{:>6} {:>5} {:>5} {:>6} {:>6} {:>6}  {:<28} {:<5} {:>12} {:>9}  said\n",
+        "seed", "r1 mm", "F0 N", "m kg", "mu K", "EA kN", "hidden", "right", "recalibrated", "diagnosed"
+    );
+    for (seed, one) in examined {
+        let (bench, loss) = (&one.case.nominal, &one.diagnosis.heldout_loss);
+        let _ = writeln!(
+            text,
+            "{seed:>6} {:>5.1} {:>5.1} {:>6.2} {:>6.2} {:>6.1}  {:<28} {:<5} {:>12.2} {:>9.2}  {}",
+            1e3 * bench.input_radius_m,
+            bench.pretension_n,
+            bench.mass_kg,
+            bench.friction_coefficient * bench.wrap_angle_rad,
+            1e-3 * bench.axial_stiffness_n,
+            one.hidden().unwrap_or("nothing"),
+            if one.is_right() { "yes" } else { "NO" },
+            loss.recalibrated,
+            loss.after,
+            one.said()
+        );
+    }
+    let right = |hides: bool| {
+        let of = examined.iter().map(|(_, one)| one).filter(|one| one.hidden().is_some() == hides);
+        let (right, all) =
+            of.fold((0, 0), |(right, all), one| (right + usize::from(one.is_right()), all + 1));
+        format!("{right} of {all}")
+    };
+    let _ = writeln!(
+        text,
+        "right: one effect {}, nothing hidden {}; something false named or stated in {} of {}",
+        right(true),
+        right(false),
+        examined.iter().filter(|(_, one)| one.is_false()).count(),
+        examined.len()
+    );
+    text
+}
