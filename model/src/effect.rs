@@ -450,10 +450,10 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Part of a sheath's length beside each pulley that is straight, when the simulation is set up.
-    fn straight_share(&self, parameters: &[f64; MAX_PARAMETERS]) -> f64 {
+    /// Places between which the sheaths are bent, in their length from the input pulley, when the simulation is set up.
+    fn bent_between(&self, parameters: &[f64; MAX_PARAMETERS]) -> Option<[f64; 2]> {
         let _ = parameters;
-        0.0
+        None
     }
 
     /// Changes what drives the winding.

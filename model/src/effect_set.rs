@@ -130,10 +130,11 @@ impl EffectSet {
         self.iter().filter_map(|active| active.effect.friction_law()).last().unwrap_or(nominal)
     }
 
-    /// Part of a sheath's length beside each pulley that is straight, by the effect that says most of it.
+    /// Places between which the sheaths are bent, by the last effect that says so.
     #[must_use]
-    pub fn straight_share(&self) -> f64 {
-        self.iter().map(|active| active.effect.straight_share(&active.parameters)).fold(0.0, f64::max)
+    pub fn bent_between(&self) -> [f64; 2] {
+        let stated = self.iter().filter_map(|active| active.effect.bent_between(&active.parameters));
+        stated.last().unwrap_or([0.0, 1.0])
     }
 
     fn for_each(

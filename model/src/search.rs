@@ -39,6 +39,8 @@ pub struct Ordinary {
     pub usual: f64,
     /// Largest strength that is not worth a name.
     pub largest: f64,
+    /// How many of its parameters a fit adapts, the strength first.
+    pub parameters: usize,
 }
 
 /// What an ordinary strength is counted in.
@@ -46,6 +48,8 @@ pub struct Ordinary {
 pub enum OrdinaryUnit {
     /// The effect's own unit, on benches with a tendon in a sheath.
     OfSheath,
+    /// The same, where the friction is spread along the sheath.
+    OfBends,
     /// The motor's stall torque at the input pulley.
     StallTorque,
 }

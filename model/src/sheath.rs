@@ -139,25 +139,25 @@ impl TendonMesh {
         Ok(Self { elements, compliance_m_per_n, wrap_share, uniform: false, total_compliance_m_per_n })
     }
 
-    /// Mesh of a tendon of end-to-end stiffness `EA/L` \[N/m\] in a sheath that is straight over `share` of its length beside each
-    /// pulley and bent evenly between. A contact has the part of the wrap angle that lies in its part of the length, so
-    /// that what is simulated follows the share without steps.
+    /// Mesh of a tendon of end-to-end stiffness `EA/L` \[N/m\] in a sheath that is bent evenly between two places, counted in its length
+    /// from the input pulley, and straight beside both pulleys. A contact has the part of the wrap angle that lies in its part of the
+    /// length, so that what is simulated follows the places without steps.
     ///
     /// # Errors
-    /// [`SheathError`] when a number is out of range; `share` is in `[0, 0.5)`.
-    pub fn with_straight_ends(
+    /// [`SheathError`] when a number is out of range; the places are in order, in `[0, 1]`.
+    pub fn bent_between(
         elements: usize,
         stiffness_n_per_m: f64,
-        share: f64,
+        [first, last]: [f64; 2],
     ) -> Result<Self, SheathError> {
-        let bent = 1.0 - 2.0 * share;
-        if !(share >= 0.0 && bent > 0.0) {
+        let bent = last - first;
+        if !(first >= 0.0 && last <= 1.0 && bent > 0.0) {
             return Err(SheathError::NotPositive { name: "bent share of the sheath", got: bent });
         }
         let mut mesh = Self::with_curvature(elements, stiffness_n_per_m, |_| 1.0)?;
         for (contact, wrap_share) in mesh.wrap_share.iter_mut().take(elements).enumerate() {
             let [from, to] = [contact, contact + 1].map(|border| border as f64 / elements as f64);
-            *wrap_share = (to.min(1.0 - share) - from.max(share)).max(0.0) / bent;
+            *wrap_share = (to.min(last) - from.max(first)).max(0.0) / bent;
         }
         Ok(mesh)
     }

@@ -67,18 +67,18 @@ impl TransmissionConfig {
         self
     }
 
-    /// The same pair in sheaths that are straight over `share` of their length beside each pulley. Friction on one contact in the
-    /// middle stays there.
+    /// The same pair in sheaths that are bent between these places alone, counted in their length from the input pulley. Friction on one
+    /// contact in the middle stays there.
     ///
     /// # Errors
-    /// [`SheathError`] when the share is not in `[0, 0.5)`.
-    pub fn with_straight_ends(self, share: f64) -> Result<Self, SheathError> {
+    /// [`SheathError`] when the places are not in order or not in `[0, 1]`.
+    pub fn bent_between(self, places: [f64; 2]) -> Result<Self, SheathError> {
         let elements = self.mesh.elements();
-        if share == 0.0 || elements == 1 {
+        if places == [0.0, 1.0] || elements == 1 {
             return Ok(self);
         }
         let stiffness_n_per_m = 1.0 / self.mesh.total_compliance_m_per_n();
-        Ok(self.with_mesh(TendonMesh::with_straight_ends(elements, stiffness_n_per_m, share)?))
+        Ok(self.with_mesh(TendonMesh::bent_between(elements, stiffness_n_per_m, places)?))
     }
 
     /// Mesh of both tendons.

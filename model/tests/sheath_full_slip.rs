@@ -19,7 +19,7 @@ fn meshes(n: usize) -> [TendonMesh; 3] {
     [
         TendonMesh::uniform(n, STIFFNESS_N_PER_M).unwrap(),
         TendonMesh::with_curvature(n, STIFFNESS_N_PER_M, bends).unwrap(),
-        TendonMesh::with_straight_ends(n, STIFFNESS_N_PER_M, 0.14).unwrap(),
+        TendonMesh::bent_between(n, STIFFNESS_N_PER_M, [0.14, 0.86]).unwrap(),
     ]
 }
 
@@ -173,7 +173,7 @@ fn impossible_meshes_are_refused() {
 /// of an element of sixteen, 16/4.5 times the stiffness from end to end.
 #[test]
 fn a_straight_end_is_stretched_before_any_contact_slips() {
-    let mesh = TendonMesh::with_straight_ends(16, STIFFNESS_N_PER_M, 0.25).unwrap();
+    let mesh = TendonMesh::bent_between(16, STIFFNESS_N_PER_M, [0.25, 0.75]).unwrap();
     let limits = SlipLimits::new(&mesh, 0.377, 0.0);
     for end in [End::Input, End::Output] {
         let mut tendon = Tendon::at_rest(&mesh, PRETENSION_N);
@@ -181,7 +181,7 @@ fn a_straight_end_is_stretched_before_any_contact_slips() {
         let rise_n = tendon.end_tension_n(&mesh, end) - PRETENSION_N;
         near("rise", rise_n, 1e-7 * STIFFNESS_N_PER_M * 16.0 / 4.5, 1e-9);
     }
-    for share in [-0.1, 0.5, f64::NAN] {
-        assert!(TendonMesh::with_straight_ends(16, STIFFNESS_N_PER_M, share).is_err());
+    for places in [[-0.1, 1.0], [0.5, 0.5], [0.0, 1.1], [f64::NAN, 1.0]] {
+        assert!(TendonMesh::bent_between(16, STIFFNESS_N_PER_M, places).is_err());
     }
 }

@@ -110,10 +110,14 @@ impl Examined {
     /// Whether exactly what is hidden was named, and nothing else stated.
     #[must_use]
     pub fn is_right(&self) -> bool {
+        let channel =
+            |effect: &ConcealedEffect| Some(effect.parameters().get("channel")?.as_str()?.to_owned());
+        let of_channel = self.case.effects.first().and_then(channel);
+        let is_there = self.diagnosis.effects.iter().all(|effect| effect.channel == of_channel);
         let named = self.diagnosis.effects.iter().map(|effect| effect.id.as_str());
         let is_quiet = self.hidden().is_some()
             || matches!(self.diagnosis.verdict, Verdict::Consistent | Verdict::Recalibrate);
-        named.eq(self.hidden()) && self.diagnosis.laws.is_empty() && is_quiet
+        named.eq(self.hidden()) && is_there && self.diagnosis.laws.is_empty() && is_quiet
     }
 
     /// Whether something is named, or a law stated, that the bench does not hide.

@@ -236,15 +236,16 @@ impl Case<'_> {
         let before = Stage::of(judge, model)?;
         progress.stage("refining", 0);
         let rounds: &[f64] = if selected.complete && !self.tensions_unseen() { &[FINE_STEP] } else { &[] };
-        let refined =
-            |found: &JointModel| refine(objective, model, &at_full_resolution(found, model), rounds);
+        let refined = |selected: &Selected| {
+            refine(objective, model, &at_full_resolution(&selected.simulated(), model), rounds)
+        };
         let unfaded = |mut selected: Selected| {
-            let mut last = refined(&selected.model)?;
+            let mut last = refined(&selected)?;
             while let Some(fewer) =
                 selected.complete.then(|| selected.without_faded(objective, &last)).flatten()
             {
                 selected = fewer;
-                last = refined(&selected.model)?;
+                last = refined(&selected)?;
             }
             Ok::<_, Failure>((selected, last))
         };
@@ -255,7 +256,7 @@ impl Case<'_> {
         if selected.model != found {
             (selected, last) = unfaded(selected)?;
         }
-        let recalibrated = Stage::of(judge, &at_full_resolution(&selected.baseline.model, model))?;
+        let recalibrated = Stage::of(judge, &at_full_resolution(&selected.recalibrated, model))?;
         let pays = |bench: Option<u16>| {
             POLICY.pays(
                 judge.mean_loss_on(bench, &recalibrated.residuals, Part::Training),
@@ -265,7 +266,7 @@ impl Case<'_> {
         let pays_anywhere = pays(None) || selected.chosen.iter().any(|one| pays(one.effect.bench));
         if selected.complete && !selected.chosen.is_empty() && !pays_anywhere {
             selected = selected.withdrawn();
-            last = refined(&selected.model)?;
+            last = refined(&selected)?;
         }
         let [_, judging] = judge.split();
         let judging = (judging.recordings() > 0).then_some(&judging);

@@ -30,7 +30,7 @@ impl Effect for MotorCoulombFriction {
 
     /// What bearings and teeth hold back.
     fn ordinary(&self) -> Option<Ordinary> {
-        Some(Ordinary { unit: OrdinaryUnit::StallTorque, usual: 4e-4, largest: 1.5e-3 })
+        Some(Ordinary { unit: OrdinaryUnit::StallTorque, usual: 4e-4, largest: 1.5e-3, parameters: 1 })
     }
 
     fn told_apart_by(&self) -> Option<&'static str> {

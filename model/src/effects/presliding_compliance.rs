@@ -32,7 +32,7 @@ impl Effect for PreslidingCompliance {
 
     /// Travel of a contact before it slips: 6 to 16 µm came out of virtual benches, whose bristles give way over 7.5 µm.
     fn ordinary(&self) -> Option<Ordinary> {
-        Some(Ordinary { unit: OrdinaryUnit::OfSheath, usual: 1e-5, largest: 4e-5 })
+        Some(Ordinary { unit: OrdinaryUnit::OfSheath, usual: 1e-5, largest: 4e-5, parameters: 1 })
     }
 
     fn is_constant(&self) -> bool {

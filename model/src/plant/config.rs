@@ -101,7 +101,7 @@ impl PlantConfig {
                     effects.friction_law(parameters.friction),
                     elements,
                 )?
-                .with_straight_ends(effects.straight_share())?,
+                .bent_between(effects.bent_between())?,
             ),
             (Some(_), None) => return Err(PlantError::PulleysMissing),
             (None, _) => None,

@@ -11,6 +11,7 @@ use std::sync::LazyLock;
 
 use bowden_model::effect::{ActiveEffect, Effect};
 use bowden_model::effects::CATALOGUE;
+use bowden_model::friction_law::FrictionLaw;
 use bowden_model::search::{Ordinary, OrdinaryUnit};
 
 use crate::fit::free::Free;
@@ -29,12 +30,19 @@ static ORDINARY: LazyLock<Vec<&'static dyn Effect>> =
 
 /// Usual and largest strength that every bench like `model` has of an effect, in the effect's unit; `None` where the model cannot have it.
 fn ordinary_in(model: &JointModel, effect: &dyn Effect) -> Option<[f64; 2]> {
-    let Ordinary { unit, usual, largest } = effect.ordinary()?;
+    let Ordinary { unit, usual, largest, .. } = effect.ordinary()?;
+    let of_sheath = model.parameters.tendon.and(model.parameters.sheath).map(|_| 1.0);
     let one = match unit {
-        OrdinaryUnit::OfSheath => model.parameters.tendon.and(model.parameters.sheath).map(|_| 1.0),
+        OrdinaryUnit::OfSheath => of_sheath,
+        OrdinaryUnit::OfBends => of_sheath.filter(|_| is_spread(model)),
         OrdinaryUnit::StallTorque => model.strength_nm(),
     }?;
     Some([usual * one, largest * one])
+}
+
+/// Whether friction is simulated along the sheaths, so that it matters where they are bent.
+fn is_spread(model: &JointModel) -> bool {
+    model.parameters.friction == FrictionLaw::Distributed && model.elements > 1
 }
 
 /// Whether something ordinary has a place beside what was found.
@@ -42,9 +50,20 @@ fn stands_beside(effect: &dyn Effect, found: &[ActiveEffect]) -> bool {
     found.iter().all(|found| found.descriptor().id != effect.descriptor().id)
 }
 
-/// Largest strength of an effect that is not worth a name; `None` for one that no bench has of itself.
+/// Largest strength of an effect that is not worth a name; `None` for one that no bench has of itself, and for one that is named only where a user
+/// asks for it.
 pub(super) fn largest_ordinary(believed: &JointModel, effect: &dyn Effect) -> Option<f64> {
-    ordinary_in(believed, effect).map(|[_, largest]| largest)
+    ordinary_in(believed, effect).filter(|_| !effect.on_request()).map(|[_, largest]| largest)
+}
+
+/// Whether an ordinary effect is how the bench is built, and stays in what is simulated after a search.
+fn is_geometry(effect: &dyn Effect) -> bool {
+    effect.ordinary().is_some_and(|ordinary| ordinary.unit == OrdinaryUnit::OfBends)
+}
+
+/// How many parameters of the ordinary effect at `place` of [`ORDINARY`] are fitted.
+fn fitted_of(place: usize) -> usize {
+    ORDINARY[place].ordinary().map_or(0, |ordinary| ordinary.parameters)
 }
 
 /// Order of the effects of a searched model.
@@ -89,6 +108,23 @@ impl Layout {
     /// The ordinary effects of `model`.
     pub(super) fn ordinary<'m>(&self, model: &'m JointModel) -> &'m [ActiveEffect] {
         &model.effects[self.own..self.first_found()]
+    }
+
+    /// The ordinary effect of `model` that is geometry: where its sheaths are bent, which no rig file states and every simulation has.
+    pub(super) fn bends(&self, model: &JointModel) -> Option<ActiveEffect> {
+        self.ordinary(model).iter().find(|effect| is_geometry(effect.effect)).copied()
+    }
+
+    /// `model` without the ordinary effects but for those that are geometry.
+    pub(super) fn with_bends_alone(&self, model: &JointModel) -> (Self, JointModel) {
+        let (mut layout, mut left) = (self.clone(), model.clone());
+        for index in (0..self.ordinary.len()).rev() {
+            if !is_geometry(ORDINARY[self.ordinary[index]]) {
+                layout.ordinary.remove(index);
+                left.effects.remove(self.own + index);
+            }
+        }
+        (layout, left)
     }
 
     /// `model` without the ordinary effects.
@@ -139,9 +175,16 @@ impl Layout {
 
     /// Places, among the parameters of [`Self::free`], of the ordinary effects that `other` lacks.
     pub(super) fn parameters_missing_in(&self, other: &Self, model: &JointModel) -> Vec<usize> {
-        let nominal = self.calibrated(model).len();
-        let gone = |(_, place): &(usize, &usize)| !other.ordinary.contains(place);
-        self.ordinary.iter().enumerate().filter(gone).map(|(index, _)| nominal + index).collect()
+        let mut next = self.calibrated(model).len();
+        let mut missing = Vec::new();
+        for place in &self.ordinary {
+            let of_effect = next..next + fitted_of(*place);
+            next = of_effect.end;
+            if !other.ordinary.contains(place) {
+                missing.extend(of_effect);
+            }
+        }
+        missing
     }
 
     /// Parameters that a search fits: the nominal ones, believed to be what the rig states, sizes of ordinary effects within
@@ -150,10 +193,17 @@ impl Layout {
         let mut free = recalibrated_from(believed, model);
         free.extend(self.stated(model));
         for (index, place) in self.ordinary.iter().enumerate() {
-            if let (Some([usual, largest]), Some(parameter)) =
-                (ordinary_in(believed, ORDINARY[*place]), Free::effect(model, self.own + index, 0))
+            let of_effect = |parameter: usize| Free::effect(model, self.own + index, parameter);
+            if is_geometry(ORDINARY[*place]) {
+                // A straight part may have no length, which no ratio comes to.
+                let largest =
+                    ordinary_in(believed, ORDINARY[*place]).map_or(f64::INFINITY, |[_, largest]| largest);
+                free.extend(of_effect(0).map(|straight| straight.up_to(largest)));
+                free.extend((1..fitted_of(*place)).filter_map(of_effect));
+            } else if let (Some([usual, largest]), Some(strength)) =
+                (ordinary_in(believed, ORDINARY[*place]), of_effect(0))
             {
-                free.push(parameter.as_ratio().up_to(largest).believed_within(usual, SPREAD));
+                free.push(strength.as_ratio().up_to(largest).believed_within(usual, SPREAD));
             }
         }
         for effect in self.first_found()..model.effects.len() {
@@ -178,7 +228,8 @@ impl Layout {
     pub(super) fn values_of_found(&self, model: &JointModel, index: usize) -> Range<usize> {
         let found = self.first_found();
         let others: usize = (found..found + index).map(|effect| Self::of_found(model, effect).len()).sum();
-        let first = self.calibrated(model).len() + self.ordinary.len() + others;
+        let ordinary: usize = self.ordinary.iter().map(|place| fitted_of(*place)).sum();
+        let first = self.calibrated(model).len() + ordinary + others;
         first..first + Free::of_effect(model, found + index).len()
     }
 
@@ -226,9 +277,9 @@ mod tests {
         bench.effects.push(effect("joint_spring"));
         let (layout, with) = Layout::of(&bench).with_ordinary(&bench);
         let (layout, with) = layout.with(&with, effect("tendon_creep"));
-        let all = ["joint_spring", "presliding_compliance", "motor_coulomb_friction", "tendon_creep"];
-        assert_eq!(ids(&with), all);
-        assert_eq!(layout.first_found(), 3);
+        let ordinary = ["straight_ends", "presliding_compliance", "motor_coulomb_friction"];
+        assert_eq!(ids(&with), [&["joint_spring"], &ordinary[..], &["tendon_creep"]].concat());
+        assert_eq!(layout.first_found(), 4);
         assert_eq!(ids(&layout.without_ordinary(&with)), ["joint_spring", "tendon_creep"]);
     }
 
@@ -254,7 +305,7 @@ mod tests {
         let bench = bench();
         let (layout, with) = Layout::of(&bench).with_ordinary(&bench);
         let (layout, with) = layout.with(&with, effect("presliding_compliance"));
-        assert_eq!(ids(&with), ["motor_coulomb_friction", "presliding_compliance"]);
+        assert_eq!(ids(&with), ["straight_ends", "motor_coulomb_friction", "presliding_compliance"]);
         assert_eq!(ids(&layout.without_ordinary(&with)), ["presliding_compliance"]);
     }
 
@@ -263,11 +314,15 @@ mod tests {
         let bench = bench();
         let (layout, mut with) = Layout::of(&bench).with_ordinary(&bench);
         assert_eq!(layout.without_exhausted(&bench, &with), None);
-        with.effects[1].parameters[0] = 1.5e-3 * STALL_NM;
+        // However long the straight parts are, they are no finding.
+        with.effects[0].parameters[0] = 0.3;
+        assert_eq!(layout.without_exhausted(&bench, &with), None);
+        with.effects[2].parameters[0] = 1.5e-3 * STALL_NM;
         let (left, without) = layout.without_exhausted(&bench, &with).unwrap();
-        assert_eq!(ids(&without), ["presliding_compliance"]);
+        assert_eq!(ids(&without), ["straight_ends", "presliding_compliance"]);
         let (back, with) = left.with_ordinary(&without);
-        assert_eq!((ids(&with), back), (vec!["presliding_compliance", "motor_coulomb_friction"], layout));
+        let all = vec!["straight_ends", "presliding_compliance", "motor_coulomb_friction"];
+        assert_eq!((ids(&with), back), (all, layout));
     }
 
     #[test]
@@ -275,8 +330,8 @@ mod tests {
         let mut bench = bench();
         bench.effects.push(effect("presliding_compliance"));
         let (layout, with) = Layout::of(&bench).with_ordinary(&bench);
-        assert_eq!(ids(&with), ["presliding_compliance", "motor_coulomb_friction"]);
-        assert_eq!(layout.first_found(), 2);
+        assert_eq!(ids(&with), ["presliding_compliance", "straight_ends", "motor_coulomb_friction"]);
+        assert_eq!(layout.first_found(), 3);
         bench.effects.clear();
         bench.parameters.tendon = None;
         bench.parameters.motor = None;
@@ -290,16 +345,38 @@ mod tests {
         let (ordinary, with) = Layout::of(&bench).with_ordinary(&bench);
         let (layout, with) = ordinary.with(&with, effect("joint_spring"));
         let (layout, with) = layout.with(&with, effect("presliding_compliance"));
-        assert_eq!(ids(&with), ["motor_coulomb_friction", "joint_spring", "presliding_compliance"]);
-        // The contact's parameter stood behind the seven nominal ones.
-        assert_eq!(ordinary.parameters_missing_in(&layout, &bench), [7]);
+        let found = ["joint_spring", "presliding_compliance"];
+        assert_eq!(ids(&with), [&["straight_ends", "motor_coulomb_friction"], &found[..]].concat());
+        // The contact's parameter stood behind the seven nominal ones and the two of the bends.
+        assert_eq!(ordinary.parameters_missing_in(&layout, &bench), [9]);
         let (back, without) = layout.without(&with, 1);
-        assert_eq!(ids(&without), ["presliding_compliance", "motor_coulomb_friction", "joint_spring"]);
+        let all = ["straight_ends", "presliding_compliance", "motor_coulomb_friction", "joint_spring"];
+        assert_eq!(ids(&without), all);
         assert_eq!(back, ordinary);
-        assert!(without.effects[0].parameters[0] < 2e-5, "{}", without.effects[0].parameters[0]);
+        assert!(without.effects[1].parameters[0] < 2e-5, "{}", without.effects[1].parameters[0]);
         let (layout, without) = layout.without(&with, 0);
-        assert_eq!(ids(&without), ["motor_coulomb_friction", "presliding_compliance"]);
-        assert_eq!(layout.first_found(), 1);
+        assert_eq!(ids(&without), ["straight_ends", "motor_coulomb_friction", "presliding_compliance"]);
+        assert_eq!(layout.first_found(), 2);
+    }
+
+    #[test]
+    fn where_a_sheath_is_bent_stays_in_what_is_simulated_and_matters_where_friction_is_spread_alone() {
+        let bench = bench();
+        let (layout, mut with) = Layout::of(&bench).with_ordinary(&bench);
+        with.effects[0].parameters[1] = 0.07;
+        let (layout, with) = layout.with(&with, effect("joint_spring"));
+        assert_eq!(layout.bends(&with), Some(with.effects[0]));
+        let (alone, left) = layout.with_bends_alone(&with);
+        assert_eq!(ids(&left), ["straight_ends", "joint_spring"]);
+        assert_eq!((alone.first_found(), alone.bends(&left)), (1, Some(with.effects[0])));
+        let lumped = |change: fn(&mut JointModel)| {
+            let mut model = bench.clone();
+            change(&mut model);
+            let (layout, with) = Layout::of(&model).with_ordinary(&model);
+            layout.bends(&with)
+        };
+        assert_eq!(lumped(|model| model.parameters.friction = FrictionLaw::Lumped), None);
+        assert_eq!(lumped(|model| model.elements = 1), None);
     }
 
     #[test]

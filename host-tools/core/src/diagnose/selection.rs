@@ -160,6 +160,8 @@ impl Chosen {
 pub struct Selected {
     /// Model with recalibrated nominal parameters and no new effect.
     pub baseline: Solution,
+    /// The same with the bends of the sheaths fitted beside them, where the rig does not state these.
+    pub recalibrated: JointModel,
     /// Model with all selected effects from the last fit, without nuisance terms.
     pub model: JointModel,
     /// Selected effects in the order of the model's new effects.
@@ -189,10 +191,21 @@ impl Selected {
         self.present.layout.ordinary(self.searched())
     }
 
+    /// Model with all selected effects, and where the sheaths are bent in the last place.
+    #[must_use]
+    pub fn simulated(&self) -> JointModel {
+        let bends = self.present.layout.bends(self.searched());
+        let mut model = self.model.clone();
+        model.effects.extend(bends);
+        model
+    }
+
     /// The same search with all effects withdrawn.
     #[must_use]
     pub fn withdrawn(self) -> Self {
-        Self { model: self.baseline.model.clone(), present: self.nothing.clone(), chosen: Vec::new(), ..self }
+        let mut model = self.recalibrated.clone();
+        model.effects.truncate(self.baseline.model.effects.len());
+        Self { model, present: self.nothing.clone(), chosen: Vec::new(), ..self }
     }
 
     /// The same search without the effects that are negligible in `fitted`, the fit to `objective` at the rig's own resolution; `None` if
@@ -241,6 +254,7 @@ pub fn select(
 ) -> Result<Selected, Failure> {
     let search = Search { objective, believed: model, asked, progress };
     let (baseline, nothing) = search.baseline()?;
+    let recalibrated = search.recalibrated(&baseline, &nothing)?;
     let mut now = Explanation { fit: nothing.clone(), chosen: Vec::new() };
     let mut rounds = Vec::new();
     search.add_names(&mut now, &mut rounds, Policy::worth_naming)?;
@@ -257,7 +271,7 @@ pub fn select(
     let Explanation { fit: present, mut chosen } = now;
     without_selected_rivals(&mut chosen);
     let (model, complete) = (present.without_ordinary(), !progress.interrupted());
-    Ok(Selected { baseline, model, chosen, rounds, trials, complete, nothing, present })
+    Ok(Selected { baseline, recalibrated, model, chosen, rounds, trials, complete, nothing, present })
 }
 
 /// Compares the effects that `selected` names with the laws of their component. Only effects that have not faded at the rig's own resolution
@@ -457,6 +471,16 @@ impl Search<'_> {
         let plain = self.fit(Layout::of(self.believed), self.believed, &[COARSE_STEP, FINE_STEP])?;
         let baseline = plain.solution.clone();
         Ok((baseline, self.with_ordinary(plain)?))
+    }
+
+    /// The recalibrated model with the bends of its sheaths, and without the other nuisance terms.
+    fn recalibrated(&self, baseline: &Solution, nothing: &Fitted) -> Result<JointModel, Failure> {
+        let (layout, with) = nothing.layout.with_bends_alone(&nothing.solution.model);
+        if layout == Layout::of(self.believed) {
+            return Ok(baseline.model.clone());
+        }
+        let fitted = self.fit(layout, &with, &[FINE_STEP])?;
+        Ok(fitted.solution.model)
     }
 
     /// `present`, refitted without the nuisance terms that are at their upper bound.

@@ -201,10 +201,13 @@ mod tests {
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let asked = Asked::default();
         let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
-        let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let fitted = |layout, model: &JointModel| {
+            search.with_ordinary(search.fit(layout, model, &[COARSE_STEP, FINE_STEP]).unwrap()).unwrap()
+        };
+        let nothing = fitted(Layout::of(&model), &model);
         let start = (nothing.layout.clone(), nothing.solution.model.clone());
         let (layout, with) = names.iter().fold(start, |(layout, model), name| layout.with(&model, *name));
-        let fit = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let fit = fitted(layout, &with);
         let chosen = fit.solution.model.effects[fit.layout.first_found()..]
             .iter()
             .map(|effect| Chosen { effect: *effect, ..Chosen::newest_of(&fit, &nothing, Vec::new()) })

@@ -37,6 +37,7 @@ fn nothing_found(bench: &JointModel) -> Selected {
     let nothing = fitted((Layout::of(bench), bench.clone()));
     Selected {
         baseline: solution(bench.clone(), Vec::new()),
+        recalibrated: bench.clone(),
         model: bench.clone(),
         chosen: Vec::new(),
         rounds: Vec::new(),
