@@ -27,9 +27,12 @@ fn play_of_one_bench_is_found_on_that_bench() {
     let written = [0, 1, 2].map(|bench| {
         let mut document = RigDocument::parse(&rig_toml, "rig.toml").unwrap();
         diagnosed.write_into(bench, &mut document).unwrap();
-        Rig::parse(&document.to_string(), "rig.diagnosed.toml").unwrap().effects.len()
+        let rig = Rig::parse(&document.to_string(), "rig.diagnosed.toml").unwrap();
+        rig.effects.iter().map(|effect| effect.descriptor().id).collect::<Vec<_>>()
     });
-    assert_eq!(written, [0, 1, 0]);
+    // Where the sheaths are bent is written of each.
+    assert_eq!(written[1], ["transmission_backlash", "straight_ends"]);
+    assert!(written[0] == ["straight_ends"] && written[2] == written[0], "{written:?}");
 }
 
 #[test]
