@@ -192,11 +192,24 @@ fn steady_starts(base: ActiveEffect, strengths: &[f64]) -> Vec<ActiveEffect> {
         .iter()
         .flat_map(|value| {
             factors.iter().map(|factor| {
-                let start = with_strength(base, *value);
+                let start = as_strong(base, *value);
                 speed.map_or(start, |spec| start.with(spec.name, factor * spec.default))
             })
         })
         .collect()
+}
+
+/// The effect with this strength, and what is counted in the same unit scaled with it: little friction that falls with speed is little at speed too.
+fn as_strong(base: ActiveEffect, value: f64) -> ActiveEffect {
+    let specs = base.descriptor().parameters;
+    let mut effect = with_strength(base, value);
+    if base.descriptor().neutral.unwrap_or(0.0) == 0.0 && base.parameters[0] > 0.0 {
+        let alike = specs.iter().skip(1).zip(&mut effect.parameters[1..]);
+        alike
+            .filter(|(spec, _)| spec.unit == specs[0].unit)
+            .for_each(|(_, parameter)| *parameter *= value / base.parameters[0]);
+    }
+    effect
 }
 
 fn with_strength(mut effect: ActiveEffect, value: f64) -> ActiveEffect {
