@@ -6,7 +6,7 @@ use std::io::{self, BufWriter};
 use std::path::Path;
 
 use bowden_core::diagnose::diagnose;
-use bowden_core::diagnose::verdict::{Diagnosis, Verdict};
+use bowden_core::diagnose::verdict::{Diagnosis, NamedEffect, Verdict};
 use bowden_core::outcome::Failure;
 use bowden_core::progress::Quiet;
 use bowden_core::rig::Rig;
@@ -39,14 +39,7 @@ pub fn drawn(seed: u64, place: usize) -> Result<Case, Failure> {
     let bench = BenchConfig::drawn(seed);
     let mut hidden = Vec::new();
     if place % ROUND < ROUND - NOTHING {
-        let listed: Vec<&str> = ConcealedEffect::IDS
-            .iter()
-            .copied()
-            .filter(|id| *id != OF_THE_NOMINAL_BENCH)
-            .filter(|id| {
-                ConcealedEffect::drawn(id, 1.0, 0).is_ok_and(|effect| !effect.is_outside_catalogue())
-            })
-            .collect();
+        let listed: Vec<&str> = ConcealedEffect::listed().filter(|id| *id != OF_THE_NOMINAL_BENCH).collect();
         let mut random = Pcg64::new(u128::from(seed), 0xBE9C);
         let id = listed[Uniform::new(0, listed.len()).map_or(0, |uniform| uniform.sample(&mut random))];
         let effect = ConcealedEffect::drawn(id, 1.0, seed).map_err(Failure::failed)?;
@@ -107,25 +100,29 @@ impl Examined {
         self.case.effects.first().map(ConcealedEffect::id)
     }
 
-    /// Whether exactly what is hidden was named, and nothing else stated.
+    /// Whether exactly what is hidden was named, on its channel, and nothing else stated.
     #[must_use]
     pub fn is_right(&self) -> bool {
-        let channel =
-            |effect: &ConcealedEffect| Some(effect.parameters().get("channel")?.as_str()?.to_owned());
-        let of_channel = self.case.effects.first().and_then(channel);
-        let is_there = self.diagnosis.effects.iter().all(|effect| effect.channel == of_channel);
-        let named = self.diagnosis.effects.iter().map(|effect| effect.id.as_str());
         let is_quiet = self.hidden().is_some()
             || matches!(self.diagnosis.verdict, Verdict::Consistent | Verdict::Recalibrate);
-        named.eq(self.hidden()) && is_there && self.diagnosis.laws.is_empty() && is_quiet
+        self.diagnosis.effects.len() == self.case.effects.len() && !self.is_false() && is_quiet
     }
 
-    /// Whether something is named, or a law stated, that the bench does not hide.
+    /// Whether something is named, or a law stated, that the bench does not hide, or does not hide on that channel.
     #[must_use]
     pub fn is_false(&self) -> bool {
-        let hidden = self.hidden();
-        self.diagnosis.effects.iter().any(|effect| Some(effect.id.as_str()) != hidden)
-            || !self.diagnosis.laws.is_empty()
+        let hidden: Vec<(&str, Option<String>)> = self
+            .case
+            .effects
+            .iter()
+            .map(|effect| {
+                let channel =
+                    effect.parameters().get("channel").and_then(|name| name.as_str()).map(str::to_owned);
+                (effect.id(), channel)
+            })
+            .collect();
+        let is_hidden = |effect: &NamedEffect| hidden.contains(&(effect.id.as_str(), effect.channel.clone()));
+        !self.diagnosis.effects.iter().all(is_hidden) || !self.diagnosis.laws.is_empty()
     }
 
     /// What was said, in short.

@@ -1,6 +1,28 @@
 //! Rounds of drawn cases, as the programs that print a table of them take them.
 
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use bowden_core::outcome::Failure;
 use clap::Args;
+
+/// Where the files of the cases go in place of a diagnosis.
+#[derive(Clone, Debug, Args)]
+pub struct Kept {
+    /// Keep the files of every case in this folder, and diagnose nothing
+    #[arg(long, value_name = "DIR")]
+    files: Option<PathBuf>,
+}
+
+impl Kept {
+    /// Folder of the case of this number, if files are kept; says which.
+    #[must_use]
+    pub fn folder(&self, number: u64) -> Option<PathBuf> {
+        let folder = self.files.as_ref()?.join(number.to_string());
+        println!("{}", folder.display());
+        Some(folder)
+    }
+}
 
 /// Which cases are drawn.
 #[derive(Clone, Copy, Debug, Args)]
@@ -17,6 +39,29 @@ pub struct Rounds {
 }
 
 impl Rounds {
+    /// Examines every case of rounds of this length, by number and place, and prints the table of those that were diagnosed.
+    pub fn run<T>(
+        self,
+        length: usize,
+        mut examine: impl FnMut(u64, usize) -> Result<Option<T>, Failure>,
+        table: impl FnOnce(&[(u64, T)]) -> String,
+    ) -> ExitCode {
+        let mut examined = Vec::new();
+        for (number, place) in self.cases(length) {
+            match examine(number, place) {
+                Ok(one) => examined.extend(one.map(|one| (number, one))),
+                Err(failure) => {
+                    eprintln!("prove: case {number}: {failure}");
+                    return ExitCode::FAILURE;
+                }
+            }
+        }
+        if !examined.is_empty() {
+            print!("{}", table(&examined));
+        }
+        ExitCode::SUCCESS
+    }
+
     /// Number and place in its round of every case, where a round has `length` of them.
     pub fn cases(self, length: usize) -> impl Iterator<Item = (u64, usize)> {
         let rounds = self.seed..self.seed.saturating_add(self.count);

@@ -84,11 +84,7 @@ pub fn study_of(seed: u64, hidden: [Vec<ConcealedEffect>; 3]) -> Result<(Study, 
 pub fn drawn(seed: u64, place: usize) -> Result<Drawn, Failure> {
     let mut random = Pcg64::new(u128::from(seed), 0x57D1);
     let mut below = |count: usize| Uniform::new(0, count).map_or(0, |uniform| uniform.sample(&mut random));
-    let listed: Vec<&'static str> = ConcealedEffect::IDS
-        .iter()
-        .copied()
-        .filter(|id| ConcealedEffect::drawn(id, 1.0, 0).is_ok_and(|effect| !effect.is_outside_catalogue()))
-        .collect();
+    let listed: Vec<&'static str> = ConcealedEffect::listed().collect();
     let id = listed[below(listed.len())];
     let (count, first) = (HIDDEN_ON[place % ROUND], below(BENCHES.len()));
     let mut hidden: [Vec<ConcealedEffect>; 3] = Default::default();

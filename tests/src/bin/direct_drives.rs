@@ -1,11 +1,11 @@
 //! `cargo xtask prove --direct`: joints without tendons, diagnosed from torque and angle.
 #![forbid(unsafe_code)]
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
+use bowden_core::outcome::Failure;
 use bowden_tests::direct_drives::{cases, examine, table, write};
-use bowden_tests::rounds::Rounds;
+use bowden_tests::rounds::{Kept, Rounds};
 use clap::Parser;
 
 /// Hide effects in joints without tendons and print what a diagnosis says of each
@@ -17,36 +17,18 @@ use clap::Parser;
 struct Options {
     #[command(flatten)]
     rounds: Rounds,
-    /// Keep the files of every joint in this folder, and diagnose nothing
-    #[arg(long, value_name = "DIR")]
-    files: Option<PathBuf>,
+    #[command(flatten)]
+    kept: Kept,
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    let mut examined = Vec::new();
+    let Options { rounds, kept } = Options::parse();
     let cases = cases();
-    for (seed, place) in options.rounds.cases(cases.len()) {
-        let hidden = &cases[place];
-        if let Some(folder) = &options.files {
-            let folder = folder.join(seed.to_string());
-            if let Err(error) = write(seed, hidden, &folder) {
-                eprintln!("direct_drives: {}: {error}", folder.display());
-                return ExitCode::FAILURE;
-            }
-            println!("{}", folder.display());
-            continue;
-        }
-        match examine(seed, hidden) {
-            Ok(one) => examined.push((seed, one)),
-            Err(failure) => {
-                eprintln!("direct_drives: seed {seed}: {failure}");
-                return ExitCode::FAILURE;
-            }
-        }
-    }
-    if options.files.is_none() {
-        print!("{}", table(&examined));
-    }
-    ExitCode::SUCCESS
+    let one = |number, place: usize| match kept.folder(number) {
+        Some(folder) => write(number, &cases[place], &folder)
+            .map(|()| None)
+            .map_err(|error| Failure::failed(format!("{}: {error}", folder.display()))),
+        None => examine(number, &cases[place]).map(Some),
+    };
+    rounds.run(cases.len(), one, table)
 }

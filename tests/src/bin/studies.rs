@@ -19,17 +19,6 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
-    let mut examined = Vec::new();
-    for (seed, place) in options.rounds.cases(ROUND) {
-        match drawn(seed, place).and_then(|one| examine(&one)) {
-            Ok(one) => examined.push((seed, one)),
-            Err(failure) => {
-                eprintln!("studies: seed {seed}: {failure}");
-                return ExitCode::FAILURE;
-            }
-        }
-    }
-    print!("{}", table(&examined));
-    ExitCode::SUCCESS
+    let Options { rounds } = Options::parse();
+    rounds.run(ROUND, |number, place| examine(&drawn(number, place)?).map(Some), table)
 }

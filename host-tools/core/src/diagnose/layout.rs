@@ -117,9 +117,14 @@ impl Layout {
 
     /// `model` without the ordinary effects but for those that are geometry.
     pub(super) fn with_bends_alone(&self, model: &JointModel) -> (Self, JointModel) {
+        self.with_those(model, |effect| is_geometry(effect.effect))
+    }
+
+    /// `model` with the ordinary effects that are to stay.
+    fn with_those(&self, model: &JointModel, stays: impl Fn(&ActiveEffect) -> bool) -> (Self, JointModel) {
         let (mut layout, mut left) = (self.clone(), model.clone());
         for index in (0..self.ordinary.len()).rev() {
-            if !is_geometry(ORDINARY[self.ordinary[index]]) {
+            if !stays(&model.effects[self.own + index]) {
                 layout.ordinary.remove(index);
                 left.effects.remove(self.own + index);
             }
@@ -136,13 +141,7 @@ impl Layout {
 
     /// `model` with one more effect, in the last place. More of what is ordinary takes the place of the ordinary.
     pub(super) fn with(&self, model: &JointModel, effect: ActiveEffect) -> (Self, JointModel) {
-        let (mut layout, mut with) = (self.clone(), model.clone());
-        for index in (0..self.ordinary.len()).rev() {
-            if !stands_beside(ORDINARY[self.ordinary[index]], &[effect]) {
-                layout.ordinary.remove(index);
-                with.effects.remove(self.own + index);
-            }
-        }
+        let (layout, mut with) = self.with_those(model, |ordinary| stands_beside(ordinary.effect, &[effect]));
         with.effects.push(effect);
         (layout, with)
     }
@@ -161,15 +160,10 @@ impl Layout {
         believed: &JointModel,
         model: &JointModel,
     ) -> Option<(Self, JointModel)> {
-        let (mut layout, mut without) = (self.clone(), model.clone());
-        for index in (0..self.ordinary.len()).rev() {
-            let effect = &model.effects[self.own + index];
+        let (layout, without) = self.with_those(model, |effect| {
             let largest = largest_ordinary(believed, effect.effect);
-            if largest.is_some_and(|largest| effect.parameters[0] >= EXHAUSTED * largest) {
-                layout.ordinary.remove(index);
-                without.effects.remove(self.own + index);
-            }
-        }
+            largest.is_none_or(|largest| effect.parameters[0] < EXHAUSTED * largest)
+        });
         (layout != *self).then_some((layout, without))
     }
 

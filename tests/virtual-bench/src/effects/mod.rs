@@ -159,6 +159,13 @@ macro_rules! effects {
                 }
             }
 
+            /// Ids that the catalogue of diagnoses has.
+            pub fn listed() -> impl Iterator<Item = &'static str> {
+                let is_listed =
+                    |id: &&str| Self::drawn(id, 1.0, 0).is_ok_and(|effect| !effect.is_outside_catalogue());
+                Self::IDS.iter().copied().filter(is_listed)
+            }
+
             /// The same for a bench of another size than the nominal one.
             #[must_use]
             pub fn sized(mut self, size: &Size) -> Self {

@@ -4,7 +4,6 @@ use serde_json::Value;
 
 use super::{Channel, Component, Describe};
 use crate::draw::Draw;
-use crate::size::Size;
 
 /// Half width of the bend \[N\].
 const KNEE_N: f64 = 0.5;
@@ -32,10 +31,6 @@ impl Describe for SensorSaturation {
         // A limit that is never reached is no fault: friction keeps the output ends lower.
         let largest_n = if matches!(channel, Channel::F1 | Channel::F3) { LARGEST_N[0] } else { LARGEST_N[1] };
         Self { channel, limit_n: largest_n * (1.0 - CUT * strength * draw.uniform(0.95, 1.05)) }
-    }
-
-    fn resize(&mut self, size: &Size) {
-        self.limit_n *= size.force;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {
