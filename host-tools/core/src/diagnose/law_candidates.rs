@@ -250,6 +250,24 @@ fn waves(base: ActiveEffect, name: &str, rates: &[f64]) -> Vec<ActiveEffect> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_bench;
+
+    #[test]
+    fn a_law_of_one_bench_is_tried_on_another_and_not_there_again() {
+        let recording = test_bench::swung(2000);
+        let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let predictions = objective.predict(&model).unwrap();
+        let id = "law_joint_friction_by_sign";
+        let law = ActiveEffect::with_defaults(law::find(id).expect("a law of this name"));
+        model.effects.push(ActiveEffect { bench: Some(0), ..law });
+        for (bench, is_tried) in [(Some(0), false), (Some(1), true), (None, false)] {
+            let all = law_candidates(bench, &model, &objective, &predictions);
+            let mut starts = all.iter().flat_map(|candidate| &candidate.starts);
+            let is_it = |start: &&ActiveEffect| start.descriptor().id == id;
+            assert_eq!(starts.find(is_it).map(|start| start.bench), is_tried.then_some(bench), "{bench:?}");
+        }
+    }
 
     #[test]
     fn a_power_of_an_angle_is_tried_below_and_above_a_straight_line_and_one_of_a_speed_once() {
