@@ -199,14 +199,15 @@ fn steady_starts(base: ActiveEffect, strengths: &[f64]) -> Vec<ActiveEffect> {
         .collect()
 }
 
-/// The effect with this strength, and what is counted in the same unit scaled with it: little friction that falls with speed is little at speed too.
+/// The effect with this strength, and what is counted in the same unit scaled with it: little friction that falls with speed is
+/// little at speed too. A number without a unit, such as an exponent, is a shape and not an amount.
 fn as_strong(base: ActiveEffect, value: f64) -> ActiveEffect {
     let specs = base.descriptor().parameters;
     let mut effect = with_strength(base, value);
     if base.descriptor().neutral.unwrap_or(0.0) == 0.0 && base.parameters[0] > 0.0 {
         let alike = specs.iter().skip(1).zip(&mut effect.parameters[1..]);
         alike
-            .filter(|(spec, _)| spec.unit == specs[0].unit)
+            .filter(|(spec, _)| spec.unit == specs[0].unit && spec.unit != "1")
             .for_each(|(_, parameter)| *parameter *= value / base.parameters[0]);
     }
     effect
