@@ -97,6 +97,14 @@ impl Default for SensorParameters {
     }
 }
 
+impl SensorParameters {
+    /// One step of the converter behind a tension amplifier, N: full scale over `2^adc_bits`.
+    #[must_use]
+    pub fn tension_step_n(&self) -> f64 {
+        self.tension_full_scale_n / (1_u64 << self.adc_bits.min(63)) as f64
+    }
+}
+
 /// All nominal parameters of one joint. A missing section is a missing part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointParameters {

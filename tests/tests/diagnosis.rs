@@ -189,7 +189,7 @@ fn play_of_the_gear() {
     outcome.predicts_within(0.9);
 }
 
-/// A contact that grows with the depth to the power of 1.5, and damps; the model knows a spring.
+/// A contact that grows with the depth to the power of 1.5, and damps.
 #[test]
 fn stop_that_gives_way() {
     let concealed =

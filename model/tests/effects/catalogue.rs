@@ -71,6 +71,7 @@ fn suffix(unit: &str) -> Option<&'static str> {
         "m" => "_m",
         "m/s" => "_m_s",
         "s" => "_s",
+        "s/rad" => "_s_per_rad",
         "kg" => "_kg",
         "1" | "unit of the channel" => return None,
         other => panic!("no suffix is agreed for the unit {other}"),

@@ -96,6 +96,11 @@ fn friction_exponents_tell_the_effect() {
     let mut run = held(0.12, &[effect("friction_drift")]);
     draw(&mut run, 0.1, 8.0);
     near("drift after 8 s", exponents(&run)[0] / a, 1.0 + 0.01 * 7.999, 1e-9);
+    // 2 % of the rate are lost a second: the integral of 0.01 e^{-0.02 t}.
+    let mut run = held(0.12, &[effect("friction_drift").with("fading_per_s", 0.02)]);
+    draw(&mut run, 0.1, 8.0);
+    let changed = 0.5 * (1.0 - (-0.02 * 7.999_f64).exp());
+    near("fading drift after 8 s", exponents(&run)[0] / a, 1.0 + changed, 1e-9);
 
     // K = π + θ_out, at the start of the last step.
     let mut run = held(0.12, &[effect("wrap_angle_varies_with_pose")]);

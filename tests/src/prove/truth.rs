@@ -29,8 +29,8 @@ const HALF_FLANK_S: f64 = 0.15;
 /// Change of tension over which a stiffening tendon is compared, N: half of what the motion's gravity torque makes.
 const TYPICAL_TENSION_N: f64 = 15.0;
 
-/// Depth at which a rubber stop and a linear one push alike, rad.
-const TYPICAL_DEPTH_RAD: f64 = 0.1;
+/// Depth at which the model states the stiffness of a stop, rad.
+const STATED_DEPTH_RAD: f64 = 0.1;
 
 /// Deflection at which a hardening spring is taken as linear, rad.
 const TYPICAL_DEFLECTION_RAD: f64 = 0.6;
@@ -141,7 +141,10 @@ fn counterpart(effect: &ConcealedEffect, bench: &BenchConfig) -> Option<Counterp
         ),
         E::BendingFriction(e) => one("friction_n_per_rad", e.force_n / bench.wrap_angle_rad),
         E::AsymmetricFriction(e) => one("asymmetry", e.excess),
-        E::FrictionDrift(e) => one("rate_per_s", e.change_after_40_s / TRAINING_S),
+        E::FrictionDrift(e) => Counterpart::of(vec![
+            ("rate_per_s", drift_per_s(e, 0.0), true),
+            ("fading_per_s", e.time_constant_s.recip(), false),
+        ]),
         E::WrapAngleVariesWithPose(e) => one("slope_rad_per_rad", e.slope),
         E::WrapAngleDisturbed(e) => Counterpart::of(vec![
             ("change_rad", e.change_rad, true),
@@ -174,8 +177,10 @@ fn counterpart(effect: &ConcealedEffect, bench: &BenchConfig) -> Option<Counterp
             ])
         }
         E::EndStopContact(e) => Counterpart::of(vec![
-            ("stiffness_nm_per_rad", e.stiffness_nm_per_rad_1_5 * TYPICAL_DEPTH_RAD.sqrt(), false),
+            ("stiffness_nm_per_rad", e.stiffness_nm_per_rad_1_5 * STATED_DEPTH_RAD.sqrt(), false),
             ("stop_rad", e.side * e.angle_rad, true),
+            ("exponent", 1.5, false),
+            ("damping_s_per_rad", e.damping_s_per_rad, false),
         ]),
         E::PayloadChange(e) => {
             Counterpart::of(vec![("change_kg", e.change_kg, true), ("time_s", e.onset_s, false)])
@@ -299,11 +304,9 @@ pub fn true_rig(case: &Case) -> String {
         match effect {
             ConcealedEffect::WrapAngleDisturbed(e) if e.onset_s + e.length_s < TRAINING_S => continue,
             ConcealedEffect::FrictionDrift(e) => {
-                let progress = |t: f64| 1.0 - (-t / e.time_constant_s).exp();
-                let factor = |t: f64| 1.0 + e.change_after_40_s * progress(t) / progress(TRAINING_S);
-                bench.friction_coefficient *= factor(TRAINING_S);
-                let later = factor(TRAINING_S + HELDOUT_S);
-                parameters = vec![("rate_per_s", (later / factor(TRAINING_S) - 1.0) / HELDOUT_S)];
+                let factor = 1.0 + e.change_after_40_s;
+                bench.friction_coefficient *= factor;
+                parameters[0].1 = drift_per_s(e, TRAINING_S) / factor;
             }
             ConcealedEffect::TendonCreep(e) => {
                 let q = 1.0 + e.compliance;
@@ -326,6 +329,13 @@ pub fn true_rig(case: &Case) -> String {
     }
     let rig = bench.rig_toml("truth").replace("effects = []", &format!("effects = {ids:?}"));
     rig + &tables
+}
+
+/// Change of the friction a second at `t_s`, over the friction at first.
+fn drift_per_s(drift: &virtual_bench::FrictionDrift, t_s: f64) -> f64 {
+    let fading_per_s = drift.time_constant_s.recip();
+    let reached = 1.0 - (-fading_per_s * TRAINING_S).exp();
+    drift.change_after_40_s * fading_per_s * (-fading_per_s * t_s).exp() / reached
 }
 
 #[cfg(test)]

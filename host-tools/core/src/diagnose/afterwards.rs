@@ -57,6 +57,18 @@ mod tests {
         assert!((rate * friction - -0.01 * 0.12).abs() < 1e-12, "{rate}");
     }
 
+    /// A rate of 0.01/s that loses 2 % of itself a second is e^{-1} of that after 50 s; by then the friction has changed by (1 - e^{-1}) 0.01 / 0.02.
+    #[test]
+    fn a_drift_that_fades_goes_on_at_the_rate_that_is_left() {
+        let drift = effect("friction_drift").with("rate_per_s", 0.01).with("fading_per_s", 0.02);
+        let now = after(50.0, &[drift]);
+        let friction = now.parameters.sheath.unwrap().friction_coefficient;
+        assert!((friction / 0.12 - 1.316_060).abs() < 1e-6, "{friction}");
+        let rate = now.effects[0].parameters[0];
+        assert!((rate * friction / 0.12 - 0.003_678_79).abs() < 1e-7, "{rate}");
+        assert_eq!(now.effects[0].parameters[1], 0.02);
+    }
+
     /// Friction that falls to half its value with a time constant of 10 s has, after as long, 1 - 0.5 (1 - 1/e) of it.
     #[test]
     fn what_has_set_in_does_not_begin_anew() {
