@@ -1,4 +1,4 @@
-//! Benches of other sizes and proportions than the nominal one, each with its own rig file: one effect hidden in each, or none.
+//! Benches of other sizes and proportions than the nominal one, each with its own rig file: an effect, two or a law hidden in most, nothing in the rest.
 
 use std::fmt::Write;
 use std::fs::{self, File};
@@ -6,15 +6,17 @@ use std::io::{self, BufWriter};
 use std::path::Path;
 
 use bowden_core::diagnose::diagnose;
-use bowden_core::diagnose::verdict::{Diagnosis, NamedEffect, Verdict};
+use bowden_core::diagnose::verdict::{Diagnosis, FoundLaw, NamedEffect, Verdict};
 use bowden_core::outcome::Failure;
 use bowden_core::progress::Quiet;
 use bowden_core::rig::Rig;
 use bowden_core::study::Study;
+use clap::ValueEnum;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use virtual_bench::{BenchConfig, Case, ConcealedEffect, MotionKind, Size};
 
+use crate::prove::true_law::true_law;
 use crate::recording_of;
 
 /// Length of the recording that is learned from, and of the one of another motion that judges, s.
@@ -31,20 +33,48 @@ const NOTHING: usize = 3;
 /// Its limit is set by what the motion of the nominal bench reaches.
 const OF_THE_NOMINAL_BENCH: &str = "sensor_saturation";
 
+/// Physics that no catalogue names, each of several kinds.
+const UNLISTED: [&str; 4] = ["unlisted_joint", "unlisted_motor", "unlisted_transmission", "unlisted_sensor"];
+
+/// What most benches of a round hide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Hides {
+    /// An effect of the catalogue
+    Effect,
+    /// Two effects of the catalogue
+    Two,
+    /// A law that no catalogue names
+    Law,
+}
+
+impl Hides {
+    /// What a bench of this size hides, by seed.
+    fn drawn(self, seed: u64, size: &Size) -> Result<Vec<ConcealedEffect>, Failure> {
+        let mut ids: Vec<&str> = match self {
+            Self::Effect | Self::Two => {
+                ConcealedEffect::listed().filter(|id| *id != OF_THE_NOMINAL_BENCH).collect()
+            }
+            Self::Law => UNLISTED.to_vec(),
+        };
+        let mut random = Pcg64::new(u128::from(seed), 0xBE9C);
+        let count = if self == Self::Two { 2 } else { 1 };
+        let mut hidden = Vec::new();
+        for _ in 0..count {
+            let id = ids.remove(Uniform::new(0, ids.len()).map_or(0, |uniform| uniform.sample(&mut random)));
+            hidden.push(ConcealedEffect::drawn(id, 1.0, seed).map_err(Failure::failed)?.sized(size));
+        }
+        Ok(hidden)
+    }
+}
+
 /// The bench at `place` of the round, with what it hides.
 ///
 /// # Errors
 /// When the virtual bench does not know an effect.
-pub fn drawn(seed: u64, place: usize) -> Result<Case, Failure> {
+pub fn drawn(hides: Hides, seed: u64, place: usize) -> Result<Case, Failure> {
     let bench = BenchConfig::drawn(seed);
-    let mut hidden = Vec::new();
-    if place % ROUND < ROUND - NOTHING {
-        let listed: Vec<&str> = ConcealedEffect::listed().filter(|id| *id != OF_THE_NOMINAL_BENCH).collect();
-        let mut random = Pcg64::new(u128::from(seed), 0xBE9C);
-        let id = listed[Uniform::new(0, listed.len()).map_or(0, |uniform| uniform.sample(&mut random))];
-        let effect = ConcealedEffect::drawn(id, 1.0, seed).map_err(Failure::failed)?;
-        hidden.push(effect.sized(&Size::of(&bench)));
-    }
+    let hidden =
+        if place % ROUND < ROUND - NOTHING { hides.drawn(seed, &Size::of(&bench))? } else { Vec::new() };
     Ok(Case::of_bench("bench", bench, hidden, seed, PERTURBED_PERCENT))
 }
 
@@ -94,35 +124,54 @@ pub fn examine(case: Case) -> Result<Examined, Failure> {
 }
 
 impl Examined {
-    /// What is hidden, if anything is.
+    /// What is hidden, in short: a law by where it acts and on what it depends.
     #[must_use]
-    pub fn hidden(&self) -> Option<&'static str> {
-        self.case.effects.first().map(ConcealedEffect::id)
+    pub fn hides(&self) -> String {
+        let words = self.case.effects.iter().map(|effect| {
+            true_law(effect)
+                .map_or_else(|| effect.id().to_owned(), |law| format!("{} of {}", law.port, law.variable))
+        });
+        if self.case.effects.is_empty() {
+            "nothing".to_owned()
+        } else {
+            words.collect::<Vec<_>>().join(" + ")
+        }
     }
 
-    /// Whether exactly what is hidden was named, on its channel, and nothing else stated.
+    /// Ids of what is hidden, in alphabetical order.
+    #[must_use]
+    pub fn hidden(&self) -> Vec<&'static str> {
+        let mut ids: Vec<&str> = self.case.effects.iter().map(ConcealedEffect::id).collect();
+        ids.sort_unstable();
+        ids
+    }
+
+    /// Whether exactly what is hidden was said and nothing else: effects by their names, on their channels, a law by where it acts and on
+    /// what it depends.
     #[must_use]
     pub fn is_right(&self) -> bool {
-        let is_quiet = self.hidden().is_some()
+        let is_quiet = !self.case.effects.is_empty()
             || matches!(self.diagnosis.verdict, Verdict::Consistent | Verdict::Recalibrate);
-        self.diagnosis.effects.len() == self.case.effects.len() && !self.is_false() && is_quiet
+        let said = self.diagnosis.effects.len() + self.diagnosis.laws.len();
+        said == self.case.effects.len() && !self.is_false() && is_quiet
     }
 
     /// Whether something is named, or a law stated, that the bench does not hide, or does not hide on that channel.
     #[must_use]
     pub fn is_false(&self) -> bool {
-        let hidden: Vec<(&str, Option<String>)> = self
-            .case
-            .effects
-            .iter()
-            .map(|effect| {
-                let channel =
-                    effect.parameters().get("channel").and_then(|name| name.as_str()).map(str::to_owned);
-                (effect.id(), channel)
+        let named = |effect: &NamedEffect| {
+            self.case.effects.iter().any(|hidden| {
+                let parameters = hidden.parameters();
+                let channel = parameters.get("channel").and_then(|name| name.as_str());
+                hidden.id() == effect.id && channel == effect.channel.as_deref()
             })
-            .collect();
-        let is_hidden = |effect: &NamedEffect| hidden.contains(&(effect.id.as_str(), effect.channel.clone()));
-        !self.diagnosis.effects.iter().all(is_hidden) || !self.diagnosis.laws.is_empty()
+        };
+        let stated = |law: &FoundLaw| {
+            self.case.effects.iter().filter_map(true_law).any(|hidden| {
+                law.port == hidden.port && law.channel == hidden.channel && law.variables == [hidden.variable]
+            })
+        };
+        !self.diagnosis.effects.iter().all(named) || !self.diagnosis.laws.iter().all(stated)
     }
 
     /// What was said, in short.
@@ -149,20 +198,20 @@ impl Examined {
 #[must_use]
 pub fn table(examined: &[(u64, Examined)]) -> String {
     let mut text = format!(
-        "{:>6} {:>5} {:>5} {:>6} {:>6} {:>6}  {:<28} {:<5} {:>12} {:>9}  said\n",
+        "{:>6} {:>5} {:>5} {:>6} {:>6} {:>6}  {:<45} {:<5} {:>12} {:>9}  said\n",
         "seed", "r1 mm", "F0 N", "m kg", "mu K", "EA kN", "hidden", "right", "recalibrated", "diagnosed"
     );
     for (seed, one) in examined {
         let (bench, loss) = (&one.case.nominal, &one.diagnosis.heldout_loss);
         let _ = writeln!(
             text,
-            "{seed:>6} {:>5.1} {:>5.1} {:>6.2} {:>6.2} {:>6.1}  {:<28} {:<5} {:>12.2} {:>9.2}  {}",
+            "{seed:>6} {:>5.1} {:>5.1} {:>6.2} {:>6.2} {:>6.1}  {:<45} {:<5} {:>12.2} {:>9.2}  {}",
             1e3 * bench.input_radius_m,
             bench.pretension_n,
             bench.mass_kg,
             bench.friction_coefficient * bench.wrap_angle_rad,
             1e-3 * bench.axial_stiffness_n,
-            one.hidden().unwrap_or("nothing"),
+            one.hides(),
             if one.is_right() { "yes" } else { "NO" },
             loss.recalibrated,
             loss.after,
@@ -170,14 +219,14 @@ pub fn table(examined: &[(u64, Examined)]) -> String {
         );
     }
     let right = |hides: bool| {
-        let of = examined.iter().map(|(_, one)| one).filter(|one| one.hidden().is_some() == hides);
+        let of = examined.iter().map(|(_, one)| one).filter(|one| one.case.effects.is_empty() != hides);
         let (right, all) =
             of.fold((0, 0), |(right, all), one| (right + usize::from(one.is_right()), all + 1));
         format!("{right} of {all}")
     };
     let _ = writeln!(
         text,
-        "right: one effect {}, nothing hidden {}; something false named or stated in {} of {}",
+        "right: something hidden {}, nothing hidden {}; something false named or stated in {} of {}",
         right(true),
         right(false),
         examined.iter().filter(|(_, one)| one.is_false()).count(),

@@ -211,6 +211,35 @@ mod tests {
         assert_eq!(tried, 5);
     }
 
+    /// A channel that reached the end of its scale in the recording shows no more than that, with an offset as well; one that did not shows what
+    /// there is.
+    #[test]
+    fn a_tension_beyond_its_scale_is_shown_as_the_end_of_it() {
+        const END_N: f64 = 30.0 * (1.0 - 1.0 / 4096.0);
+        let mut recording = test_bench::swung(1500);
+        let mut model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let within = replay(&model, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let [f1, f2] = [Channel::F1, Channel::F2].map(|channel| within.channel(channel).unwrap());
+        assert!(largest(f1) > 31.0 && largest(f2) > 31.0);
+
+        model.parameters.sensors.tension_full_scale_n = 30.0;
+        recording.set(Channel::F1, f1.iter().map(|n| n.min(END_N)).collect());
+        let input = ReplayInput::new(&model, &recording).unwrap();
+        let ended = replay(&model, &input).unwrap();
+        let expected: Vec<f64> = f1.iter().map(|n| n.min(END_N)).collect();
+        assert_eq!(ended.channel(Channel::F1).unwrap(), expected);
+        assert_eq!(ended.channel(Channel::F2).unwrap(), f2);
+
+        let offset = bowden_model::effects::find("sensor_offset").unwrap();
+        let mut offset = ActiveEffect::with_defaults(offset).with("offset", 2.0);
+        offset.target = Target::One(Channel::F1);
+        let seen = ended.seen_through(Channel::F1, offset, &input).unwrap();
+        assert!(
+            largest(&seen) == END_N && seen.iter().zip(f1).all(|(seen, n)| (n + 2.0).min(END_N) == *seen)
+        );
+    }
+
     /// A joint a hundredth as strong answers the same motion with a hundredth of every tension and torque, guide included.
     #[test]
     fn a_weaker_joint_is_guided_as_the_strong_one_is() {

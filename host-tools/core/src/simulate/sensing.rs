@@ -79,7 +79,7 @@ fn digitised(parameters: &SensorParameters, channel: Channel, value: f64, noise:
         }
         Channel::F1 | Channel::F2 | Channel::F3 | Channel::F4 => {
             let codes = steps(parameters.adc_bits);
-            let n_per_lsb = parameters.tension_full_scale_n / codes;
+            let n_per_lsb = parameters.tension_step_n();
             let code = ((value + normal(parameters.tension_noise_n)) / n_per_lsb).round();
             code.clamp(0.0, codes - 1.0) * n_per_lsb
         }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bowden_model::channel::Channel;
 
 use super::guide::Hold;
+use super::sensors::end_of_scale_n;
 use crate::joint_model::{GuidedBy, JointModel};
 use crate::outcome::Failure;
 use crate::reconstruct::{Motion, moving_average};
@@ -28,10 +29,13 @@ pub struct ReplayInput {
     pub(super) hold: Hold,
     /// Torque by the duty, root mean square, of a joint without tendons that its angle guides, N·m.
     driven_nm: Option<f64>,
+    /// Channels that reached the end of their scale in the recording, with the largest value that they show.
+    pub(super) ends_of_scale: Arc<[(Channel, f64)]>,
 }
 
 impl ReplayInput {
-    /// Takes time and the input roles of `model` from a recording, and nothing else.
+    /// Takes time and the input roles of `model` from a recording, and of the predicted channels no more than whether they reached the end of
+    /// their scale.
     ///
     /// # Errors
     /// When an input role is missing.
@@ -82,7 +86,11 @@ impl ReplayInput {
         // A joint whose angle is no input is taken to stand where its reference begins, until it is told otherwise.
         let reference_rad = theta_ref_rad.as_ref().and_then(|reference| reference.first().copied());
         let start_rad = motion.as_ref().map(|m| m.theta_rad[0]).or(reference_rad);
+        let end_of_scale = |channel: &Channel| {
+            Some((*channel, end_of_scale_n(&model.parameters.sensors, recording, *channel)?))
+        };
         Ok(Self {
+            ends_of_scale: model.outputs.iter().filter_map(end_of_scale).collect(),
             motion,
             duty,
             bus_v,
@@ -97,6 +105,14 @@ impl ReplayInput {
             step_s,
             t_s,
         })
+    }
+
+    /// Cuts values of a channel off where its scale ended in the recording.
+    pub(super) fn end_scale(&self, channel: Channel, values: &mut [f64]) {
+        let end = self.ends_of_scale.iter().find(|(of, _)| *of == channel);
+        if let Some((_, largest)) = end {
+            values.iter_mut().filter(|value| **value > *largest).for_each(|value| *value = *largest);
+        }
     }
 
     /// States where the joint stands and how it moves at the first sample, for joints whose angle is not an input.
@@ -131,6 +147,7 @@ impl ReplayInput {
             clock_offset_s: self.clock_offset_s,
             hold: self.hold,
             driven_nm: self.driven_nm,
+            ends_of_scale: Arc::clone(&self.ends_of_scale),
         }
     }
 

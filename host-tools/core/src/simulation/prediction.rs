@@ -26,7 +26,7 @@ impl Prediction {
     }
 
     /// One channel of the same joint seen with one more effect on its sensor, in the last place; empty for what was not
-    /// predicted.
+    /// predicted. At the end of a scale it takes what is shown for what there is.
     ///
     /// # Errors
     /// When the set of one effect cannot be made.
@@ -39,7 +39,9 @@ impl Prediction {
         let effects = EffectSet::from_slice(&[effect]).map_err(Failure::bad_input)?;
         let values = self.channel(channel).unwrap_or_default();
         let clocks_s: Vec<f64> = (0..values.len()).map(|k| input.clock_at_s(k)).collect();
-        Ok(through(&clocks_s, values, |states, port| effects.measure(channel, states, port)))
+        let mut seen = through(&clocks_s, values, |states, port| effects.measure(channel, states, port));
+        input.end_scale(channel, &mut seen);
+        Ok(seen)
     }
 
     /// Values of a channel, which is left empty; empty for what was not predicted.

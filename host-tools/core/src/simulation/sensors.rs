@@ -1,9 +1,29 @@
-//! Sensors of a replay: channels as they would show without noise and steps.
+//! Sensors of a replay: channels as they would show without noise and steps, up to the end of their scale.
 
 use bowden_model::channel::Channel;
 use bowden_model::effect::{ActiveEffect, EffectState, SensorPort};
 use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
+use bowden_model::parameters::SensorParameters;
 use bowden_model::plant::{Plant, PlantConfig};
+
+use crate::recording::Recording;
+
+/// The largest value of a tension channel that reached the end of its scale in a recording, N; `None` where it kept below.
+///
+/// A tension beyond `tension_full_scale_n` is shown as the last step of the converter. A channel that shows more than its rig file grants it
+/// has another scale, of which the end is not known.
+pub(super) fn end_of_scale_n(
+    sensors: &SensorParameters,
+    recording: &Recording,
+    channel: Channel,
+) -> Option<f64> {
+    if !Channel::TENSIONS.contains(&channel) {
+        return None;
+    }
+    let largest_n = recording.channel(channel)?.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (full_scale_n, step_n) = (sensors.tension_full_scale_n, sensors.tension_step_n());
+    (full_scale_n - 1.5 * step_n..=full_scale_n + 0.5 * step_n).contains(&largest_n).then_some(largest_n)
+}
 
 /// What the sensors would have shown had they no noise and no steps.
 pub(super) struct Sampler<'a> {
@@ -16,13 +36,20 @@ struct Sensor<'a> {
     channel: Channel,
     /// Effects that act on it, in their order, with their states.
     effects: Vec<(&'a ActiveEffect, EffectState)>,
+    /// Largest value that it can show.
+    largest: f64,
 }
 
 impl<'a> Sampler<'a> {
-    pub fn new(outputs: &[Channel], effects: &'a EffectSet) -> Self {
+    pub fn new(outputs: &[Channel], effects: &'a EffectSet, ends_of_scale: &[(Channel, f64)]) -> Self {
         let sensor = |channel: &Channel| {
             let fresh = |effect| (effect, EffectState::default());
-            Sensor { channel: *channel, effects: effects.on(*channel).map(fresh).collect() }
+            let end = ends_of_scale.iter().find(|(of, _)| of == channel);
+            Sensor {
+                channel: *channel,
+                effects: effects.on(*channel).map(fresh).collect(),
+                largest: end.map_or(f64::INFINITY, |(_, largest)| *largest),
+            }
         };
         Self { sensors: outputs.iter().map(sensor).collect(), values: vec![0.0; outputs.len()] }
     }
@@ -34,14 +61,14 @@ impl<'a> Sampler<'a> {
         duty: f64,
         (t_s, dt_s): (f64, f64),
     ) -> &[f64] {
-        for (Sensor { channel, effects }, value) in self.sensors.iter_mut().zip(&mut self.values) {
+        for (Sensor { channel, effects, largest }, value) in self.sensors.iter_mut().zip(&mut self.values) {
             let outside = if *channel == Channel::Duty { duty } else { 0.0 };
             let mut port =
                 SensorPort { t_s, dt_s, value: plant.channel(config, *channel).unwrap_or(outside) };
             for (active, state) in effects {
                 active.effect.measure(&active.parameters, state, &mut port);
             }
-            *value = port.value;
+            *value = if port.value > *largest { *largest } else { port.value };
         }
         &self.values
     }
@@ -64,4 +91,25 @@ pub fn through(
             port.value
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 100 N in 4096 steps of 0.0244 N: the converter ends at 99.9756 N.
+    #[test]
+    fn a_channel_ends_where_its_converter_does() {
+        let sensors = SensorParameters { tension_full_scale_n: 100.0, adc_bits: 12, ..Default::default() };
+        let of = |channel, largest_n| {
+            let recording =
+                Recording::new("any", vec![0.0, 1e-3, 2e-3]).with(channel, vec![3.0, largest_n, 5.0]);
+            end_of_scale_n(&sensors, &recording, channel)
+        };
+        assert_eq!(of(Channel::F1, 99.9756), Some(99.9756));
+        assert_eq!(of(Channel::F4, 100.0), Some(100.0), "some files have the full scale itself");
+        assert_eq!(of(Channel::F1, 99.9), None, "a reading below its end");
+        assert_eq!(of(Channel::F1, 104.0), None, "a scale that the rig file does not know");
+        assert_eq!(of(Channel::ThetaOut, 99.9756), None, "an angle");
+    }
 }

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::{Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// Speed over which a torque against the motion changes its sign \[rad/s\].
 const TURNING_RAD_PER_S: f64 = 1e-2;
@@ -42,6 +43,10 @@ impl Describe for UnlistedMotor {
             MotorLaw::Shaker => (0.1, draw.uniform(3.0, 18.0)),
         };
         Self { law, size_nm: strength * size_nm * draw.uniform(0.85, 1.2), place }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.size_nm *= size.torque;
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {

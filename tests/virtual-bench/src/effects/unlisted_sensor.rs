@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::{Channel, Component, Describe};
 use crate::draw::Draw;
+use crate::size::Size;
 
 /// What a sensor shows beyond the true value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +49,15 @@ impl Describe for UnlistedSensor {
             SensorLaw::Interpolation => (Channel::ThetaOut, 0.015, draw.one_of(&[8.0, 16.0, 32.0])),
         };
         Self { law, channel, size: strength * size * draw.uniform(0.85, 1.2), place }
+    }
+
+    fn resize(&mut self, size: &Size) {
+        self.size *= match self.law {
+            // The square of a load that is `force` times as large.
+            SensorLaw::Curved => size.force.recip(),
+            SensorLaw::WarmingUp | SensorLaw::Mains => size.force,
+            SensorLaw::Interpolation => 1.0,
+        };
     }
 
     fn parameters(&self) -> Vec<(&'static str, Value)> {
