@@ -224,10 +224,10 @@ mod tests {
         assert!(largest(f1) > 31.0 && largest(f2) > 31.0);
 
         model.parameters.sensors.tension_full_scale_n = 30.0;
-        recording.set(Channel::F1, f1.iter().map(|n| n.min(END_N)).collect());
+        let expected: Vec<f64> = f1.iter().map(|n| n.min(END_N)).collect();
+        recording.set(Channel::F1, expected.clone());
         let input = ReplayInput::new(&model, &recording).unwrap();
         let ended = replay(&model, &input).unwrap();
-        let expected: Vec<f64> = f1.iter().map(|n| n.min(END_N)).collect();
         assert_eq!(ended.channel(Channel::F1).unwrap(), expected);
         assert_eq!(ended.channel(Channel::F2).unwrap(), f2);
 

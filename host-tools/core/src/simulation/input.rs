@@ -30,7 +30,7 @@ pub struct ReplayInput {
     /// Torque by the duty, root mean square, of a joint without tendons that its angle guides, N·m.
     driven_nm: Option<f64>,
     /// Channels that reached the end of their scale in the recording, with the largest value that they show.
-    pub(super) ends_of_scale: Arc<[(Channel, f64)]>,
+    ends_of_scale: Arc<[(Channel, f64)]>,
 }
 
 impl ReplayInput {
@@ -107,12 +107,10 @@ impl ReplayInput {
         })
     }
 
-    /// Cuts values of a channel off where its scale ended in the recording.
-    pub(super) fn end_scale(&self, channel: Channel, values: &mut [f64]) {
+    /// The largest value that a channel can show: the end of its scale if the recording reached it.
+    pub(super) fn largest_shown(&self, channel: Channel) -> f64 {
         let end = self.ends_of_scale.iter().find(|(of, _)| *of == channel);
-        if let Some((_, largest)) = end {
-            values.iter_mut().filter(|value| **value > *largest).for_each(|value| *value = *largest);
-        }
+        end.map_or(f64::INFINITY, |(_, largest)| *largest)
     }
 
     /// States where the joint stands and how it moves at the first sample, for joints whose angle is not an input.

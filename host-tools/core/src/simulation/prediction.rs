@@ -5,7 +5,7 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::EffectSet;
 
 use super::input::ReplayInput;
-use super::sensors::through;
+use super::sensors::{cut_off, through};
 use crate::outcome::Failure;
 use crate::progress::Progress;
 
@@ -39,9 +39,11 @@ impl Prediction {
         let effects = EffectSet::from_slice(&[effect]).map_err(Failure::bad_input)?;
         let values = self.channel(channel).unwrap_or_default();
         let clocks_s: Vec<f64> = (0..values.len()).map(|k| input.clock_at_s(k)).collect();
-        let mut seen = through(&clocks_s, values, |states, port| effects.measure(channel, states, port));
-        input.end_scale(channel, &mut seen);
-        Ok(seen)
+        let largest = input.largest_shown(channel);
+        Ok(through(&clocks_s, values, |states, port| {
+            effects.measure(channel, states, port);
+            port.value = cut_off(port.value, largest);
+        }))
     }
 
     /// Values of a channel, which is left empty; empty for what was not predicted.

@@ -84,7 +84,7 @@ impl Run<'_> {
         }
         let recorded = Recorded::of(self);
         plant.settle(self.config, &recorded.step_input(0..1, start_rad));
-        let mut sampler = Sampler::new(outputs, effects, &input.ends_of_scale);
+        let mut sampler = Sampler::new(outputs, effects, input);
         let mut delayed = DelayLine::new(self.model.servo.map_or(0.0, |servo| servo.delay_s), start_rad);
         let mut duty = 0.0;
         // Error of the angle as the lead of the guide has it.

@@ -6,6 +6,7 @@ use bowden_model::effect_set::{EffectSet, EffectStates, FRESH_STATES};
 use bowden_model::parameters::SensorParameters;
 use bowden_model::plant::{Plant, PlantConfig};
 
+use super::input::ReplayInput;
 use crate::recording::Recording;
 
 /// The largest value of a tension channel that reached the end of its scale in a recording, N; `None` where it kept below.
@@ -25,6 +26,11 @@ pub(super) fn end_of_scale_n(
     (full_scale_n - 1.5 * step_n..=full_scale_n + 0.5 * step_n).contains(&largest_n).then_some(largest_n)
 }
 
+/// What a sensor shows that can show no more than `largest`. What is not a number stays so: a simulation ran away.
+pub(super) fn cut_off(value: f64, largest: f64) -> f64 {
+    if value > largest { largest } else { value }
+}
+
 /// What the sensors would have shown had they no noise and no steps.
 pub(super) struct Sampler<'a> {
     sensors: Vec<Sensor<'a>>,
@@ -41,14 +47,13 @@ struct Sensor<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    pub fn new(outputs: &[Channel], effects: &'a EffectSet, ends_of_scale: &[(Channel, f64)]) -> Self {
+    pub fn new(outputs: &[Channel], effects: &'a EffectSet, input: &ReplayInput) -> Self {
         let sensor = |channel: &Channel| {
             let fresh = |effect| (effect, EffectState::default());
-            let end = ends_of_scale.iter().find(|(of, _)| of == channel);
             Sensor {
                 channel: *channel,
                 effects: effects.on(*channel).map(fresh).collect(),
-                largest: end.map_or(f64::INFINITY, |(_, largest)| *largest),
+                largest: input.largest_shown(*channel),
             }
         };
         Self { sensors: outputs.iter().map(sensor).collect(), values: vec![0.0; outputs.len()] }
@@ -68,7 +73,7 @@ impl<'a> Sampler<'a> {
             for (active, state) in effects {
                 active.effect.measure(&active.parameters, state, &mut port);
             }
-            *value = if port.value > *largest { *largest } else { port.value };
+            *value = cut_off(port.value, *largest);
         }
         &self.values
     }
