@@ -123,6 +123,20 @@ pub fn examine(case: Case) -> Result<Examined, Failure> {
     Ok(Examined { case, diagnosis })
 }
 
+/// Whether the named effect is the hidden one, on its channel.
+fn names(effect: &NamedEffect, hidden: &ConcealedEffect) -> bool {
+    let parameters = hidden.parameters();
+    let channel = parameters.get("channel").and_then(|name| name.as_str());
+    hidden.id() == effect.id && channel == effect.channel.as_deref()
+}
+
+/// Whether the law is the hidden one: where it acts and on what it depends.
+fn states(law: &FoundLaw, hidden: &ConcealedEffect) -> bool {
+    true_law(hidden).is_some_and(|hidden| {
+        law.port == hidden.port && law.channel == hidden.channel && law.variables == [hidden.variable]
+    })
+}
+
 impl Examined {
     /// What is hidden, in short: a law by where it acts and on what it depends.
     #[must_use]
@@ -146,32 +160,26 @@ impl Examined {
         ids
     }
 
-    /// Whether exactly what is hidden was said and nothing else: effects by their names, on their channels, a law by where it acts and on
-    /// what it depends.
+    /// Whether exactly what is hidden was said, each once, and nothing else: effects by their names, on their channels, a law by where it acts
+    /// and on what it depends.
     #[must_use]
     pub fn is_right(&self) -> bool {
-        let is_quiet = !self.case.effects.is_empty()
-            || matches!(self.diagnosis.verdict, Verdict::Consistent | Verdict::Recalibrate);
-        let said = self.diagnosis.effects.len() + self.diagnosis.laws.len();
-        said == self.case.effects.len() && !self.is_false() && is_quiet
+        let hidden = &self.case.effects;
+        let Diagnosis { effects, laws, verdict, .. } = &self.diagnosis;
+        let is_quiet = !hidden.is_empty() || matches!(verdict, Verdict::Consistent | Verdict::Recalibrate);
+        let is_said = |hidden: &ConcealedEffect| {
+            effects.iter().any(|effect| names(effect, hidden)) || laws.iter().any(|law| states(law, hidden))
+        };
+        effects.len() + laws.len() == hidden.len() && hidden.iter().all(is_said) && is_quiet
     }
 
     /// Whether something is named, or a law stated, that the bench does not hide, or does not hide on that channel.
     #[must_use]
     pub fn is_false(&self) -> bool {
-        let named = |effect: &NamedEffect| {
-            self.case.effects.iter().any(|hidden| {
-                let parameters = hidden.parameters();
-                let channel = parameters.get("channel").and_then(|name| name.as_str());
-                hidden.id() == effect.id && channel == effect.channel.as_deref()
-            })
-        };
-        let stated = |law: &FoundLaw| {
-            self.case.effects.iter().filter_map(true_law).any(|hidden| {
-                law.port == hidden.port && law.channel == hidden.channel && law.variables == [hidden.variable]
-            })
-        };
-        !self.diagnosis.effects.iter().all(named) || !self.diagnosis.laws.iter().all(stated)
+        let hidden = &self.case.effects;
+        let Diagnosis { effects, laws, .. } = &self.diagnosis;
+        effects.iter().any(|effect| !hidden.iter().any(|hidden| names(effect, hidden)))
+            || laws.iter().any(|law| !hidden.iter().any(|hidden| states(law, hidden)))
     }
 
     /// What was said, in short.

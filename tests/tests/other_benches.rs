@@ -25,11 +25,14 @@ fn where_a_sheath_is_bent_is_not_taken_for_tendons_that_stiffen() {
 /// The stop gets stiffer with depth and damps, and one of the two channels has an offset.
 #[test]
 fn channels_that_reach_the_end_of_their_scale_are_not_faulty() {
-    let examined = examine(drawn(Hides::Two, 100, 0).unwrap()).unwrap();
+    let mut examined = examine(drawn(Hides::Two, 100, 0).unwrap()).unwrap();
     assert_eq!(examined.hidden(), ["end_stop_contact", "sensor_offset"]);
     assert!(examined.is_right(), "{}", examined.said());
     let loss = &examined.diagnosis.heldout_loss;
     assert!(loss.recalibrated > 50.0 && loss.after < 1.0, "{loss:?}");
+
+    examined.diagnosis.effects[1] = examined.diagnosis.effects[0].clone();
+    assert!(!examined.is_right() && !examined.is_false(), "one of two, said twice");
 }
 
 /// Friction that loses 47 % in 40 s, at a rate that fades with 78 s: taken for a straight line, its errors in the 20 s after that are six times as large.
