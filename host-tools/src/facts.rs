@@ -159,7 +159,7 @@ impl Facts {
         let mut treated = recording.clone();
         let noted = treated.notes().len();
         treated.drop_frozen_rows();
-        treated.set_spikes_aside();
+        treated.set_spikes_aside(|_| None);
         lines.extend(treated.notes()[noted..].iter().map(|note| {
             let note = note.replace(" were set aside", " would be set aside");
             note.replace(" were dropped", " would be dropped")

@@ -207,15 +207,18 @@ impl Recording {
     ///
     /// A spike is a run of at most two samples that stands out of what is before and after it by eight times as much as the
     /// samples around it change; see [`spikes`] for all conditions. A channel of which more than one sample in fifty would
-    /// be one is left as it is.
-    pub fn set_spikes_aside(&mut self) {
-        let mechanical: Vec<Channel> = self.channels().filter(|channel| channel.is_mechanical()).collect();
+    /// be one is left as it is. So is, of any channel, a run of as many beyond the `largest` magnitude that it can have, where no more
+    /// than one sample in two hundred is.
+    pub fn set_spikes_aside(&mut self, largest: impl Fn(Channel) -> Option<f64>) {
+        let channels: Vec<Channel> = self.channels().collect();
         let mut counted: Vec<String> = Vec::new();
         let mut first: Option<(usize, String)> = None;
         let mut set_aside = 0;
-        for channel in mechanical {
+        for channel in channels {
             let values = self.channel(channel).unwrap_or_default();
-            let found = spikes::find(values);
+            let beyond = largest(channel).map_or_else(Vec::new, |largest| spikes::beyond(values, largest));
+            let outstanding = if channel.is_mechanical() { spikes::find(values) } else { Vec::new() };
+            let found = spikes::together(beyond, outstanding);
             let Some(run) = found.first() else { continue };
             let count: usize = found.iter().map(ExactSizeIterator::len).sum();
             if first.as_ref().is_none_or(|(start, _)| run.start < *start) {

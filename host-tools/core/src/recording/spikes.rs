@@ -7,6 +7,9 @@
 //! - `h` is more than [`FEWEST_QUANTA`] times the channel's resolution, or of a channel without one, its median change, and
 //!   more than [`LEAST_HEIGHT`] of the range in which all but the outermost samples lie: a smaller one does no harm.
 //!
+//! So is a run of as many that lies beyond what the channel can show, between neighbours that do not, where that is rare
+//! ([`RARE`]) and no run is longer: another unit shows in most samples.
+//!
 //! Friction that lets go and a stop that is hit leave steps, ramps and ringing, whose neighbours differ; white noise of
 //! standard deviation σ has changes up to 3.5 σ among the twenty around, so that `h` is 20 σ and more.
 
@@ -34,6 +37,32 @@ const OUTERMOST: f64 = 0.01;
 
 /// Share of the samples from which on what stands out is how the channel is.
 const LARGEST_SHARE: f64 = 0.02;
+
+/// Share of the samples up to which values that a channel cannot show are spikes.
+const RARE: f64 = 0.005;
+
+/// Samples whose magnitude is beyond `largest`, as runs in ascending order; none where one of these is no spike.
+pub(super) fn beyond(values: &[f64], largest: f64) -> Vec<Range<usize>> {
+    let samples: Vec<usize> = (0..values.len()).filter(|sample| values[*sample].abs() > largest).collect();
+    let runs = runs(&samples);
+    let is_spike = |run: &Range<usize>| run.len() <= LONGEST && run.start > 0 && run.end < values.len();
+    let is_rare = samples.len() as f64 <= RARE * values.len() as f64;
+    if is_rare && runs.iter().all(is_spike) { runs } else { Vec::new() }
+}
+
+/// The samples of both, as runs in ascending order.
+pub(super) fn together(one: Vec<Range<usize>>, other: Vec<Range<usize>>) -> Vec<Range<usize>> {
+    let mut samples: Vec<usize> = one.into_iter().chain(other).flatten().collect();
+    samples.sort_unstable();
+    samples.dedup();
+    runs(&samples)
+}
+
+/// Runs of samples that follow one another, of samples in ascending order.
+fn runs(samples: &[usize]) -> Vec<Range<usize>> {
+    let follow = |one: &usize, next: &usize| one + 1 == *next;
+    samples.chunk_by(follow).map(|run| run[0]..run[0] + run.len()).collect()
+}
 
 /// Runs of samples that are spikes, in ascending order; each has a neighbour on both sides.
 pub(super) fn find(values: &[f64]) -> Vec<Range<usize>> {
@@ -183,6 +212,28 @@ mod tests {
             ("too few", vec![1.0, 50.0, 1.0]),
         ] {
             assert_eq!(find(&values), [], "{what}");
+        }
+    }
+
+    /// A duty that chatters by a third in every sample hides a spike from its neighbours, but 1.4 is no duty; one in percent is no spike.
+    #[test]
+    fn what_a_channel_cannot_show_is_a_spike_where_it_is_rare() {
+        let duty = |k: usize| 0.3 * (k as f64 * 2e-3).sin() + if k.is_multiple_of(2) { 0.17 } else { -0.17 };
+        let clean: Vec<f64> = (0..4000).map(duty).collect();
+        let with = |samples: &[usize]| {
+            let mut values = clean.clone();
+            for sample in samples {
+                values[*sample] = -1.4;
+            }
+            values
+        };
+        let rare = with(&[100, 2000, 2001]);
+        assert_eq!((find(&rare), beyond(&rare, 1.05)), (Vec::new(), vec![100..101, 2000..2002]));
+        let often: Vec<usize> = (0..21).map(|k| 100 + 10 * k).collect();
+        let percent: Vec<f64> = clean.iter().map(|duty| 100.0 * duty).collect();
+        assert_eq!(together(vec![4..5, 9..10], vec![2..4, 9..11]), [2..5, 9..11]);
+        for values in [clean.clone(), with(&[0]), with(&[3999]), with(&[7, 8, 9]), with(&often), percent] {
+            assert_eq!(beyond(&values, 1.05), []);
         }
     }
 

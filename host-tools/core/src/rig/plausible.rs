@@ -50,7 +50,7 @@ pub(super) fn accept(rig: &Rig, mut recording: Recording, samples: usize) -> Res
         let gaps = find_gaps(&recording, step_s);
         recording.add_notes(gaps);
     }
-    recording.set_spikes_aside();
+    recording.set_spikes_aside(|channel| limit(rig, channel).map(|limit| limit.magnitude));
     for channel in recording.channels() {
         let Some(limit) = limit(rig, channel) else { continue };
         let values = recording.channel(channel).unwrap_or_default();
@@ -110,5 +110,34 @@ fn limit(rig: &Rig, channel: Channel) -> Option<Limit> {
             limit(MARGIN * motor.supply_v / motor.resistance_ohm, "if it is in another unit than A")
         }
         Channel::DriveEnable => limit(1.0, "if it is no 0 or 1"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_bench;
+
+    /// The duty changes by a third from sample to sample.
+    fn chattering(duty_of_one: f64, factor: f64) -> Recording {
+        let chatter = |k: usize| factor * if k.is_multiple_of(2) { 0.17 } else { -0.17 };
+        let mut duty: Vec<f64> = (0..1000).map(chatter).collect();
+        duty[700] = duty_of_one;
+        let mut recording = test_bench::swung(1000);
+        recording.set(Channel::Duty, duty);
+        recording.set(Channel::BusVoltage, vec![24.0; 1000]);
+        recording
+    }
+
+    #[test]
+    fn one_value_that_a_channel_cannot_have_is_set_aside_and_many_are_refused() {
+        let rig = test_bench::rig();
+        let accepted = accept(&rig, chattering(-1.4, 1.0), MINIMUM_SAMPLES).unwrap();
+        assert!((accepted.channel(Channel::Duty).unwrap()[700] + 0.17).abs() < 1e-12);
+        assert!(
+            accepted.notes()[0].contains("duty is -1.4 between -0.17 and -0.17; one value of 1000 samples")
+        );
+        let percent = accept(&rig, chattering(-1.4, 100.0), MINIMUM_SAMPLES).unwrap_err();
+        assert!(percent.to_string().contains("duty: got 17, expected within ±1.0500 1; if it is in percent"));
     }
 }
