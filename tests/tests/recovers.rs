@@ -121,9 +121,10 @@ fn sheath_viscous_friction() {
 
 #[test]
 fn tendon_stiffening() {
-    // The bench's stiffness grows by 0.6 F0/30 N per relative tension at F0 and saturates beyond 30 N; the model's goes on.
+    // The bench's stiffness levels off with stretch, the model's with tension. From F0 to 1.5 F0 it grows by 0.243 (13.3 N of linear
+    // stretch, 0.6 * 13.3 / hypot(13.3, 30)), down to 0.5 F0 it falls by 0.308 (18.0 N): slopes of 0.486 and 0.617.
     Recovery::of(bench::TendonStiffening { excess: 0.6, knee_n: 30.0 }, 12, as_it_is)
-        .finds("slope", 0.6, 0.1 * 0.6)
+        .finds("slope", 0.55, 0.1 * 0.55)
         .leaves_less_than(0.4);
 }
 

@@ -1,6 +1,10 @@
 //! Dry friction of motor and gear that falls with speed: `τ = τ_c + τ_s e^{-(ω/ω_s)²}`.
 
-use crate::effect::{Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, ParameterSpec};
+use crate::dry_friction::BuildUp;
+use crate::effect::{
+    Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, MotorPort, PRESLIDING, PRESLIDING_EXPONENT,
+    ParameterSpec,
+};
 use crate::search::NAMED_STRENGTH;
 use libm::exp;
 
@@ -27,6 +31,8 @@ static DESCRIPTOR: Descriptor = Descriptor {
             "speed at which the excess has fallen to 37 %",
         ),
         ParameterSpec::linear("coulomb_nm", "N·m", [0.0, 20.0], 0.04, "friction at speed"),
+        PRESLIDING,
+        PRESLIDING_EXPONENT,
     ],
     neutral: None,
     channels: &[],
@@ -53,5 +59,7 @@ impl Effect for MotorStribeckFriction {
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         let ratio = port.omega_rad_s / p[1];
         port.coulomb_nm += p[2] + p[0] * exp(-ratio * ratio);
+        port.presliding_rad = p[3];
+        port.build_up = BuildUp::of_exponent(p[4]);
     }
 }

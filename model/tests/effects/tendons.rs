@@ -143,6 +143,20 @@ fn stretch_tells_the_effect() {
     near("stiffening, pulled", f1, PRETENSION_N * (1.0 + (0.3 * x).exp_m1() / 0.3), 1e-6);
     near("stiffening, released", f3, PRETENSION_N * (1.0 + (-0.3 * x).exp_m1() / 0.3), 1e-6);
 
+    // EA (1 + β (1 + c/2) r / (1 + c |r|)) with β = 0.5 and c = 3: dT = k(T) dx in ten thousand midpoint steps.
+    let levels = effect("tendon_stiffening").with("slope", 0.5).with("levelling", 3.0);
+    let mut run = held(0.0, &[levels]);
+    stretch(&mut run, 0.04);
+    draw(&mut run, 0.0, 0.1);
+    let pulled_to = |x: f64| {
+        let gain = |r: f64| 1.0 + 0.5 * 2.5 * r / (1.0 + 3.0 * r.abs());
+        let step = x / 1e4;
+        PRETENSION_N * (0..10_000).fold(1.0, |t, _| t + step * gain(t + 0.5 * step * gain(t - 1.0) - 1.0))
+    };
+    let [f1, _, f3, _] = run.tensions_n();
+    near("levelling, pulled", f1, pulled_to(x), 1e-6);
+    near("levelling, released", f3, pulled_to(-x), 1e-6);
+
     // Creep of 15 %: at held stretch T = T_0/(1 + ρ) in the end, on the way with the time constant τ/(1 + ρ).
     let mut run = held(0.0, &[effect("tendon_creep")]);
     draw(&mut run, 0.0, 8.0);

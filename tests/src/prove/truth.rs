@@ -26,9 +26,6 @@ const COPPER_PER_K: f64 = 0.0039;
 /// Half of a flank of a disturbed wrap angle, s.
 const HALF_FLANK_S: f64 = 0.15;
 
-/// Change of tension over which a stiffening tendon is compared, N: half of what the motion's gravity torque makes.
-const TYPICAL_TENSION_N: f64 = 15.0;
-
 /// Depth at which the model states the stiffness of a stop, rad.
 const STATED_DEPTH_RAD: f64 = 0.1;
 
@@ -153,11 +150,15 @@ fn counterpart(effect: &ConcealedEffect, bench: &BenchConfig) -> Option<Counterp
         ])
         .since(e.onset_s + HALF_FLANK_S),
         E::TendonSlack(_) => Counterpart::of(Vec::new()),
-        E::TendonStiffening(e) => Counterpart::of(vec![(
-            "slope",
-            (e.excess * bench.pretension_n / TYPICAL_TENSION_N.hypot(e.knee_n)).clamp(-0.4, 0.9),
-            false,
-        )]),
+        E::TendonStiffening(e) => {
+            // Gain of stiffness over the gain that it ends at, with half of the pretension more and with all of it.
+            let share = |times: f64| times / times.hypot(e.knee_n / bench.pretension_n);
+            let bent = 0.5 * share(1.0) / share(0.5);
+            Counterpart::of(vec![
+                ("slope", (e.excess * share(0.5) / 0.5).clamp(-0.4, 0.9), false),
+                ("levelling", ((1.0 - bent) / (bent - 0.5)).clamp(0.0, 8.0), false),
+            ])
+        }
         E::TendonCreep(e) => {
             Counterpart::of(vec![("ratio", e.compliance, true), ("time_constant_s", e.time_constant_s, true)])
         }
