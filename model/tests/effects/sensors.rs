@@ -77,3 +77,31 @@ fn lagging_sensor() {
         near(&format!("{t_s} s"), port.value, 20.0 - 10.0 * (-t_s / 0.02_f64).exp(), 1e-12);
     }
 }
+
+/// Five filters of 4 ms: a step is there to `1 - e^{-x} Σ x^i/i!`, i < 5, after x filters (Erlang's distribution), 56 % after all five; a ramp
+/// of 100 N/s comes late by their sum less half a sample each, 20 ms - 0.25 ms. The
+/// filters behind the first take the end of a sample for all of it and show the step 0.2 ms early, 0.05 filters, in which it rises by 0.01.
+#[test]
+fn sensor_with_a_dead_time() {
+    let late = ActiveEffect::with_defaults(find("sensor_lag").unwrap()).with("dead_time", 1.0);
+    let set = EffectSet::from_slice(&[ActiveEffect { target: Target::One(Channel::F1), ..late }]).unwrap();
+    let after = |steps: u32, value: &dyn Fn(f64) -> f64| {
+        let mut states = FRESH_STATES;
+        (0..=steps).fold(0.0, |_, k| {
+            let t_s = f64::from(k) * 1e-4;
+            let mut port = SensorPort { t_s, dt_s: if k == 0 { 0.0 } else { 1e-4 }, value: value(t_s) };
+            set.measure(Channel::F1, &mut states, &mut port);
+            port.value
+        })
+    };
+    for (steps, filters) in [(40, 1.0_f64), (200, 5.0), (400, 10.0)] {
+        let terms = (1..5).scan(1.0, |term, i| {
+            *term *= filters / f64::from(i);
+            Some(*term)
+        });
+        let missing = (-filters).exp() * (1.0 + terms.sum::<f64>());
+        let step = |t_s: f64| if t_s > 0.0 { 1.0 } else { 0.0 };
+        near(&format!("{filters} filters"), after(steps, &step), 1.0 - missing, 1e-2);
+    }
+    near("ramp", after(10_000, &|t_s| 100.0 * t_s), 100.0 * (1.0 - 0.02 + 0.00025), 2e-4);
+}
