@@ -24,9 +24,12 @@ enum Part {
     Text,
     /// Length of the whole, 32 bits, and pairs of texts.
     Texts,
-    /// Length of the whole, 32 bits, and fixed fields.
+    /// Length of the whole, 32 bits, and entries of [`ENTRY`] bytes.
     Entries,
 }
+
+/// Bytes of an entry: a channel's number and a place in the file.
+const ENTRY: usize = 10;
 
 /// Parts of a record up to its last text, after the MCAP specification.
 const fn parts(opcode: u8) -> &'static [Part] {
@@ -51,7 +54,9 @@ fn longer_text(opcode: u8, body: &[u8]) -> Option<u64> {
     for part in parts(opcode) {
         let stepped = match part {
             Part::Fixed(length) => rest.get(*length..).ok_or(None),
-            Part::Text | Part::Entries => behind(rest).map(|(_, rest)| rest),
+            Part::Text => behind(rest).map(|(_, rest)| rest),
+            Part::Entries => behind(rest)
+                .and_then(|(entries, _)| rest.get(4 + entries.len().next_multiple_of(ENTRY)..).ok_or(None)),
             Part::Texts => behind(rest).and_then(|(texts, _)| behind_pairs(&rest[4..], texts.len())),
         };
         match stepped {
@@ -69,11 +74,11 @@ fn behind(bytes: &[u8]) -> Result<(&[u8], &[u8]), Option<u64>> {
     rest.split_at_checked(length as usize).ok_or(Some(length.into()))
 }
 
-/// What is behind the texts that begin within the first `length` bytes: a parser reads the last of them to its own end.
+/// What is behind the pairs of texts that begin within the first `length` bytes: a parser reads the last of them to its own end.
 fn behind_pairs(bytes: &[u8], length: usize) -> Result<&[u8], Option<u64>> {
     let mut rest = bytes;
     while bytes.len() - rest.len() < length {
-        rest = behind(rest)?.1;
+        rest = behind(behind(rest)?.1)?.1;
     }
     Ok(rest)
 }
@@ -126,5 +131,12 @@ mod tests {
             parse_record(op::METADATA, &body),
             Err(McapError::RecordTooLarge { len: 0x300_0000, .. })
         ));
+        // What begins within a length is read to its own end: the value of a pair whose key fills the map, an entry of one byte.
+        let body = [text("name"), 7_u32.to_le_bytes().to_vec(), text("key"), vec![0, 0, 0, 4]].concat();
+        let entry = [vec![0; 32], 1_u32.to_le_bytes().to_vec(), vec![0; 10 + 8], vec![0, 0, 0, 4]].concat();
+        for (opcode, body) in [(op::METADATA, body), (op::CHUNK_INDEX, entry)] {
+            let refused = parse_record(opcode, &body);
+            assert!(matches!(refused, Err(McapError::RecordTooLarge { len: 0x400_0000, .. })), "{refused:?}");
+        }
     }
 }
