@@ -1,11 +1,15 @@
-//! Somebody moves the sheaths for a while: `K` changes by `ΔK` from `t_0` to `t_0 + T`, with ramps of a tenth of `T`.
+//! Somebody moves the sheaths for a while: `K` changes by `ΔK` from `t_0` to `t_0 + T`, with ramps of a tenth of `T`, 2 s at
+//! most.
 
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
 };
 use crate::search::Aftermath;
 
-/// Somebody moves the sheaths for a while: `K` changes by `ΔK` from `t_0` to `t_0 + T`, with ramps of a tenth of `T`.
+/// A hand has moved a sheath within this time, s: a change that takes longer is a drift.
+const LONGEST_RAMP_S: f64 = 2.0;
+
+/// Somebody moves the sheaths for a while: `K` changes by `ΔK` from `t_0` to `t_0 + T`, with ramps of a tenth of `T`, 2 s at most.
 pub struct WrapAngleDisturbed;
 
 static DESCRIPTOR: Descriptor = Descriptor {
@@ -35,7 +39,7 @@ impl Effect for WrapAngleDisturbed {
     fn transmission(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut TransmissionPort) {
         let since_s = port.t_s - p[1];
         let until_s = p[1] + p[2] - port.t_s;
-        let ramp_s = 0.1 * p[2];
+        let ramp_s = (0.1 * p[2]).min(LONGEST_RAMP_S);
         let share = (since_s.min(until_s) / ramp_s).clamp(0.0, 1.0);
         for tendon in &mut port.tendons {
             tendon.wrap_angle_rad = (tendon.wrap_angle_rad + p[0] * share).max(0.0);
