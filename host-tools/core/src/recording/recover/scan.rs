@@ -234,7 +234,8 @@ impl<R: Read + Seek, W: Write + Seek> Scan<'_, R, W> {
         };
         for damage in self.damages.iter_mut().filter(|damage| damage.until_s.is_none()) {
             damage.until_s = Some(t_s);
-            damage.rows = Some(self.sequence.map_or(sequence, |last| sequence.wrapping_sub(last + 1)));
+            damage.rows =
+                Some(self.sequence.map_or(sequence, |last| sequence.wrapping_sub(last).wrapping_sub(1)));
         }
         self.sequence = Some(sequence);
         self.sink.row(t_s, &cells)
