@@ -57,13 +57,16 @@ fn friction_costs_speed() {
 /// friction gives way by its share of the presliding turn, and comes back from there.
 #[test]
 fn standstill_below_breakaway() {
-    for (id, level, travel_rad) in [
-        ("motor_coulomb_friction", 0.08 * 2.0 / (PULLEY_NM_PER_A * 24.0), PRESLIDING_RAD),
-        ("motor_stribeck_friction", 0.12 * 2.0 / (PULLEY_NM_PER_A * 24.0), PRESLIDING_RAD),
-        ("drive_dead_zone", 0.03, 0.0),
+    let stribeck = effect("motor_stribeck_friction");
+    for (active, level, travel_rad) in [
+        (effect("motor_coulomb_friction"), 0.08 * 2.0 / (PULLEY_NM_PER_A * 24.0), PRESLIDING_RAD),
+        (stribeck, 0.12 * 2.0 / (PULLEY_NM_PER_A * 24.0), PRESLIDING_RAD),
+        (stribeck.with("presliding_rad", 2e-3), 0.12 * 2.0 / (PULLEY_NM_PER_A * 24.0), 2e-3),
+        (effect("drive_dead_zone"), 0.03, 0.0),
     ] {
+        let id = active.descriptor().id;
         for sign in [1.0, -1.0] {
-            let mut run = free_motor(&[effect(id)], 5e-4);
+            let mut run = free_motor(&[active], 5e-4);
             // Led there within a second: a step of the duty would carry the rotor beyond.
             for (begun_s, from, share) in [(0.0, 0.0, 0.99), (2.0, 0.99, 0.0), (4.0, 0.0, -0.99)] {
                 run.until(begun_s + 2.0, |t_s| {
@@ -75,6 +78,18 @@ fn standstill_below_breakaway() {
             let slipped_rad = sign * run.plant.theta_motor_rad();
             assert!(slipped_rad > 2.0 * travel_rad + 1e-4, "{id}: {slipped_rad}");
         }
+    }
+}
+
+/// Dry friction that builds up ever more slowly gives way by `s ln 10` under nine tenths of it, in proportion by 0.9 `s`.
+#[test]
+fn friction_that_falls_with_speed_builds_up_in_either_way() {
+    for (exponent, turns) in [(0.0, 0.9), (1.0, std::f64::consts::LN_10)] {
+        let kind = effect("motor_stribeck_friction").with("presliding_rad", 2e-3);
+        let mut run = free_motor(&[kind.with("presliding_exponent", exponent)], 5e-4);
+        let breakaway = 0.12 * 2.0 / (PULLEY_NM_PER_A * 24.0);
+        run.until(4.0, |t_s| duty(0.9 * breakaway * t_s.min(1.0)));
+        near(&format!("exponent {exponent}"), run.plant.theta_motor_rad(), turns * 2e-3, 0.01 * turns * 2e-3);
     }
 }
 

@@ -78,9 +78,9 @@ fn lagging_sensor() {
     }
 }
 
-/// Five filters of 4 ms: a step is there to `1 - e^{-x} Σ x^i/i!`, i < 5, after x filters (Erlang's distribution), 56 % after all five; a ramp
-/// of 100 N/s comes late by their sum less half a sample each, 20 ms - 0.25 ms. The
+/// Five filters of 4 ms: a step is there to `1 - e^{-x} Σ x^i/i!`, i < 5, after x filters (Erlang's distribution), 56 % after all five. The
 /// filters behind the first take the end of a sample for all of it and show the step 0.2 ms early, 0.05 filters, in which it rises by 0.01.
+/// A ramp of 100 N/s comes late by the sum of all less half a sample each, 20 ms - 0.25 ms.
 #[test]
 fn sensor_with_a_dead_time() {
     let late = ActiveEffect::with_defaults(find("sensor_lag").unwrap()).with("dead_time", 1.0);

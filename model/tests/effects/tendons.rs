@@ -117,6 +117,14 @@ fn friction_exponents_tell_the_effect() {
         draw(&mut run, 0.1, time_s);
         near(&format!("disturbed, {until_s} s"), exponents(&run)[0], 0.12 * (K_RAD + added_rad), 1e-9);
     }
+
+    // For 100 s: half of the way after 1 s, all of it after 2 s and not after a tenth of the time.
+    let mut run = held(0.12, &[effect("wrap_angle_disturbed").with("duration_s", 100.0)]);
+    for (until_s, added_rad) in [(11.0, 0.75), (12.1, 1.5)] {
+        let time_s = until_s - run.plant.t_s();
+        draw(&mut run, 0.1, time_s);
+        near(&format!("moved, {until_s} s"), exponents(&run)[0], 0.12 * (K_RAD + added_rad), 2e-4);
+    }
 }
 
 /// Frictionless cables turned against a held joint: what tension does with stretch.
@@ -143,19 +151,22 @@ fn stretch_tells_the_effect() {
     near("stiffening, pulled", f1, PRETENSION_N * (1.0 + (0.3 * x).exp_m1() / 0.3), 1e-6);
     near("stiffening, released", f3, PRETENSION_N * (1.0 + (-0.3 * x).exp_m1() / 0.3), 1e-6);
 
-    // EA (1 + β (1 + c/2) r / (1 + c |r|)) with β = 0.5 and c = 3: dT = k(T) dx in ten thousand midpoint steps.
-    let levels = effect("tendon_stiffening").with("slope", 0.5).with("levelling", 3.0);
-    let mut run = held(0.0, &[levels]);
-    stretch(&mut run, 0.04);
-    draw(&mut run, 0.0, 0.1);
-    let pulled_to = |x: f64| {
-        let gain = |r: f64| 1.0 + 0.5 * 2.5 * r / (1.0 + 3.0 * r.abs());
-        let step = x / 1e4;
-        PRETENSION_N * (0..10_000).fold(1.0, |t, _| t + step * gain(t + 0.5 * step * gain(t - 1.0) - 1.0))
-    };
-    let [f1, _, f3, _] = run.tensions_n();
-    near("levelling, pulled", f1, pulled_to(x), 1e-6);
-    near("levelling, released", f3, pulled_to(-x), 1e-6);
+    // EA (1 + β (1 + c/2) r / (1 + c |r|)) with β = 0.5: dT = k(T) dx in ten thousand midpoint steps. With c = 2/3 the closed form of the
+    // released cable has a denominator β (1 + c/2) - c of zero.
+    for levelling in [3.0, 2.0 / 3.0] {
+        let levels = effect("tendon_stiffening").with("slope", 0.5).with("levelling", levelling);
+        let mut run = held(0.0, &[levels]);
+        stretch(&mut run, 0.04);
+        draw(&mut run, 0.0, 0.1);
+        let pulled_to = |x: f64| {
+            let gain = |r: f64| 1.0 + 0.5 * (1.0 + 0.5 * levelling) * r / (1.0 + levelling * r.abs());
+            let step = x / 1e4;
+            PRETENSION_N * (0..10_000).fold(1.0, |t, _| t + step * gain(t + 0.5 * step * gain(t - 1.0) - 1.0))
+        };
+        let [f1, _, f3, _] = run.tensions_n();
+        near(&format!("levelling {levelling}, pulled"), f1, pulled_to(x), 1e-6);
+        near(&format!("levelling {levelling}, released"), f3, pulled_to(-x), 1e-6);
+    }
 
     // Creep of 15 %: at held stretch T = T_0/(1 + ρ) in the end, on the way with the time constant τ/(1 + ρ).
     let mut run = held(0.0, &[effect("tendon_creep")]);
