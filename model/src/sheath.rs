@@ -80,7 +80,6 @@ pub struct TendonMesh {
     elements: usize,
     compliance_m_per_n: [f64; MAX_ELEMENTS + 1],
     wrap_share: [f64; MAX_ELEMENTS],
-    uniform: bool,
     total_compliance_m_per_n: f64,
 }
 
@@ -90,9 +89,7 @@ impl TendonMesh {
     /// # Errors
     /// [`SheathError`] when a number is out of range.
     pub fn uniform(elements: usize, stiffness_n_per_m: f64) -> Result<Self, SheathError> {
-        let mut mesh = Self::with_curvature(elements, stiffness_n_per_m, |_| 1.0)?;
-        mesh.uniform = true;
-        Ok(mesh)
+        Self::with_curvature(elements, stiffness_n_per_m, |_| 1.0)
     }
 
     /// Mesh for a sheath whose curvature at the relative arc length `s` in `[0, 1]` (0 = input) is proportional to
@@ -136,7 +133,7 @@ impl TendonMesh {
         }
         compliance_m_per_n[0] *= 0.5;
         compliance_m_per_n[elements] *= 0.5;
-        Ok(Self { elements, compliance_m_per_n, wrap_share, uniform: false, total_compliance_m_per_n })
+        Ok(Self { elements, compliance_m_per_n, wrap_share, total_compliance_m_per_n })
     }
 
     /// Mesh of a tendon of end-to-end stiffness `EA/L` \[N/m\] in a sheath that is bent evenly between two places, counted in its length
@@ -168,6 +165,12 @@ impl TendonMesh {
         self.elements
     }
 
+    /// Whether contact `i` has the wrap angle of the one before it.
+    #[inline]
+    fn is_as_the_contact_before(&self, i: usize) -> bool {
+        i > 0 && self.wrap_share[i] == self.wrap_share[i - 1]
+    }
+
     /// Elongation per tension of the whole tendon, L/EA, m/N.
     #[must_use]
     pub const fn total_compliance_m_per_n(&self) -> f64 {
@@ -196,53 +199,52 @@ impl SlipLimits {
             inverse_ratio: [1.0; MAX_ELEMENTS],
             offset_share: [0.0; MAX_ELEMENTS],
         };
-        limits.set(mesh, wrap_friction, offset_n);
+        limits.set(mesh, [wrap_friction, offset_n]);
         limits
     }
 
-    /// Replaces the limits; costs nothing when nothing changed.
-    pub fn set(&mut self, mesh: &TendonMesh, wrap_friction: f64, offset_n: f64) {
-        self.set_beside(mesh, wrap_friction, offset_n, &mut [f64::NAN; 4]);
-    }
-
-    /// The same; `even` is what contacts of equal wrap came to last, `[μK, qK, ratio, offset]`: limits that change at every step are
-    /// mostly the same for both tendons.
-    pub(crate) fn set_beside(
-        &mut self,
-        mesh: &TendonMesh,
-        wrap_friction: f64,
-        offset_n: f64,
-        even: &mut [f64; 4],
-    ) {
-        let n = mesh.elements;
+    /// Replaces the limits by those for `μK` and `qK` \[N\]; costs nothing when nothing changed.
+    pub fn set(&mut self, mesh: &TendonMesh, [wrap_friction, offset_n]: [f64; 2]) {
         if wrap_friction == self.wrap_friction && offset_n == self.offset_n {
             return;
         }
-        if mesh.uniform {
-            if [wrap_friction, offset_n] != even[..2] {
-                let ratio = exp(-wrap_friction / n as f64);
-                let offset = contact_offset_n(wrap_friction, offset_n, mesh.wrap_share[0]);
-                *even = [wrap_friction, offset_n, ratio, offset];
+        let turned = wrap_friction != self.wrap_friction;
+        // Mostly there is none, and was none.
+        let has_offset = offset_n != 0.0 || self.offset_n != 0.0;
+        for i in 0..mesh.elements {
+            // Contacts of the same wrap have the same limits; an exponential takes longer than all the rest.
+            if mesh.is_as_the_contact_before(i) {
+                self.ratio[i] = self.ratio[i - 1];
+                self.inverse_ratio[i] = self.inverse_ratio[i - 1];
+                self.offset_share[i] = self.offset_share[i - 1];
+                continue;
             }
-            let [.., ratio, offset] = *even;
-            if wrap_friction != self.wrap_friction {
-                self.ratio[..n].fill(ratio);
-                self.inverse_ratio[..n].fill(1.0 / ratio);
+            let wrap_share = mesh.wrap_share[i];
+            if turned {
+                self.ratio[i] = exp(-wrap_friction * wrap_share);
+                self.inverse_ratio[i] = 1.0 / self.ratio[i];
             }
-            // Mostly there is none, and was none.
-            if offset_n != 0.0 || self.offset_n != 0.0 {
-                self.offset_share[..n].fill(offset);
-            }
-        } else {
-            for (i, wrap_share) in mesh.wrap_share[..n].iter().enumerate() {
-                if wrap_friction != self.wrap_friction {
-                    self.ratio[i] = exp(-wrap_friction * wrap_share);
-                    self.inverse_ratio[i] = 1.0 / self.ratio[i];
-                }
-                self.offset_share[i] = contact_offset_n(wrap_friction, offset_n, *wrap_share);
+            if has_offset {
+                self.offset_share[i] = contact_offset_n(wrap_friction, offset_n, wrap_share);
             }
         }
         (self.wrap_friction, self.offset_n) = (wrap_friction, offset_n);
+    }
+
+    /// Takes the limits of another end or tendon in the same mesh, if they are for this friction; otherwise they are set anew. Limits that
+    /// change at every step are mostly the same for both tendons.
+    pub(crate) fn set_beside(&mut self, mesh: &TendonMesh, friction: [f64; 2], other: &Self) {
+        let n = mesh.elements;
+        if friction == [other.wrap_friction, other.offset_n]
+            && friction != [self.wrap_friction, self.offset_n]
+        {
+            self.ratio[..n].copy_from_slice(&other.ratio[..n]);
+            self.inverse_ratio[..n].copy_from_slice(&other.inverse_ratio[..n]);
+            self.offset_share[..n].copy_from_slice(&other.offset_share[..n]);
+            [self.wrap_friction, self.offset_n] = friction;
+        } else {
+            self.set(mesh, friction);
+        }
     }
 }
 
@@ -430,12 +432,14 @@ impl Tendon {
     fn fill_in_stale(&mut self, mesh: &TendonMesh) {
         let Some(full) = self.full_slip else { return };
         let sign = if full.towards_input { -1.0 } else { 1.0 };
-        let even_step = exp(sign * full.wrap_friction / mesh.elements as f64);
+        let (mut step, mut offset) = (1.0, 0.0);
         let mut tension = self.tension_n[0];
         for i in 0..mesh.elements {
-            let share = mesh.wrap_share[i];
-            let step = if mesh.uniform { even_step } else { exp(sign * full.wrap_friction * share) };
-            let offset = contact_offset_n(full.wrap_friction, full.offset_n, share);
+            if !mesh.is_as_the_contact_before(i) {
+                let share = mesh.wrap_share[i];
+                step = exp(sign * full.wrap_friction * share);
+                offset = contact_offset_n(full.wrap_friction, full.offset_n, share);
+            }
             tension = if full.towards_input { step * tension - offset } else { step * (tension + offset) };
             self.tension_n[i + 1] = tension;
         }
@@ -523,6 +527,46 @@ impl Tendon {
             let step = steps[contact(i)];
             tension = step * tension + offset_n(i, step);
             self.tension_n[segment(i + 1)] = tension;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SlipLimits, TendonMesh};
+
+    /// Every contact by its own wrap, whatever its neighbours have and whatever was set before; beside another's limits they are the same.
+    #[test]
+    fn limits_are_those_of_the_wrap_of_each_contact() {
+        let meshes = [
+            TendonMesh::uniform(4, 7e4),
+            TendonMesh::bent_between(5, 7e4, [0.1, 0.7]),
+            TendonMesh::with_curvature(4, 7e4, |s| s * s),
+        ];
+        for mesh in meshes.map(Result::unwrap) {
+            let mut limits = SlipLimits::new(&mesh, 0.3, 0.0);
+            let mut beside = limits;
+            for friction in [[0.5, 0.0], [0.5, 2.0], [0.7, 2.0], [0.7, 0.0], [0.2, 0.0]] {
+                let [wrap_friction, offset_n] = friction;
+                limits.set(&mesh, friction);
+                beside.set_beside(&mesh, friction, &limits);
+                assert_eq!(beside, limits);
+                for i in 0..mesh.elements() {
+                    let x = wrap_friction * mesh.wrap_share[i];
+                    let offset = if x > 0.0 { offset_n * (1.0 - libm::exp(-x)) / wrap_friction } else { 0.0 };
+                    let got = [limits.ratio[i], limits.inverse_ratio[i], limits.offset_share[i]];
+                    for (got, expected) in got.into_iter().zip([libm::exp(-x), libm::exp(x), offset]) {
+                        assert!(
+                            (got - expected).abs() < 1e-12,
+                            "contact {i}, {friction:?}: {got}, {expected}"
+                        );
+                    }
+                }
+                // Of another friction nothing is taken over.
+                let mut other = SlipLimits::new(&mesh, 0.9, 1.0);
+                other.set_beside(&mesh, [0.1, 0.0], &limits);
+                assert!((other.ratio[0] - libm::exp(-0.1 * mesh.wrap_share[0])).abs() < 1e-12);
+            }
         }
     }
 }

@@ -253,17 +253,19 @@ impl Transmission {
                     + state.end_tension_n(&config.mesh, End::Output));
         }
         effects.transmission(states, &mut port);
-        let mut even = [[f64::NAN; 4]; 2];
-        for (index, tendon) in port.tendons.iter().enumerate() {
+        let friction = port.tendons.each_ref().map(|tendon| {
             let wrap_angle_rad = tendon.wrap_angle_rad.max(0.0);
-            for ((limits, law), even) in self.limits[index].iter_mut().zip(&tendon.slip).zip(&mut even) {
-                limits.set_beside(
-                    &config.mesh,
-                    law.friction_coefficient.max(0.0) * wrap_angle_rad,
-                    law.friction_n_per_rad.max(0.0) * wrap_angle_rad,
-                    even,
-                );
-            }
+            tendon.slip.map(|law| {
+                [law.friction_coefficient, law.friction_n_per_rad]
+                    .map(|value| value.max(0.0) * wrap_angle_rad)
+            })
+        });
+        let [[a_in, a_out], [b_in, b_out]] = &mut self.limits;
+        a_in.set(&config.mesh, friction[0][0]);
+        a_out.set_beside(&config.mesh, friction[0][1], a_in);
+        b_in.set_beside(&config.mesh, friction[1][0], a_in);
+        b_out.set_beside(&config.mesh, friction[1][1], a_out);
+        for (index, tendon) in port.tendons.iter().enumerate() {
             let longer_m = tendon.added_length_m - self.added_length_m[index];
             if longer_m != 0.0 {
                 self.tendons[index].add_length(&config.mesh, longer_m);

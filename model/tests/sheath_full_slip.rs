@@ -92,7 +92,7 @@ fn elongation_is_what_the_ends_were_pulled() {
                     direction = [random.signed(), random.signed()];
                 }
                 if step % 501 == 0 {
-                    limits.set(&mesh, 0.4 + 0.4 * random.signed(), 2.0 + 2.0 * random.signed());
+                    limits.set(&mesh, [0.4 + 0.4 * random.signed(), 2.0 + 2.0 * random.signed()]);
                 }
                 for (end, share) in [(End::Input, direction[0]), (End::Output, direction[1])] {
                     let pull_m = stride_m * (share + 0.3 * random.signed());
