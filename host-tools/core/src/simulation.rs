@@ -133,7 +133,7 @@ pub fn replay_passes_into(
 ) -> Result<(), Failure> {
     let config = model.plant()?;
     let drive = model.drive()?;
-    let run = Run { model, config: &config, input, drive, pace: Pace::whole(model, &config) };
+    let run = Run { model, config: &config, input, drive, pace: Pace::whole(model, input, &config) };
     if drive != Drive::GuidedMotor {
         run.execute(Guide::NONE, outputs, sink);
         return Ok(());
@@ -313,8 +313,8 @@ mod tests {
         recording.set(Channel::Duty, rippled);
         let input = ReplayInput::new(&model, &recording).unwrap();
         let config = model.plant().unwrap();
-        let [whole, rough] =
-            [Pace::whole(&model, &config), Pace::rough(&model, &input, &config)].map(|pace| {
+        let [whole, rough] = [Pace::whole(&model, &input, &config), Pace::rough(&model, &input, &config)]
+            .map(|pace| {
                 let run =
                     Run { model: &model, config: &config, input: &input, drive: Drive::GuidedMotor, pace };
                 run.ahead_nm(&mut Prediction::default())

@@ -33,30 +33,41 @@ pub(super) struct Run<'a> {
     pub pace: Pace,
 }
 
+/// Part of the longest step by which a recording's own interval may be longer and still be one step: clocks are not exact.
+const LONGER_INTERVAL: f64 = 0.1;
+
+/// Part of a step by which one of a clock that jitters may be longer than the others: with none, half of its intervals would take two.
+const JITTER: f64 = 0.4;
+
 /// How finely a pass is simulated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pace {
     /// Samples from one that is simulated to the next.
     stride: usize,
-    /// Longest step, s.
-    longest_s: f64,
+    /// Step between samples that are as far apart as most, s.
+    usual_s: f64,
 }
 
 impl Pace {
-    /// Every sample, in steps no longer than the model's.
-    pub fn whole(model: &JointModel, config: &PlantConfig) -> Self {
-        Self { stride: 1, longest_s: model.step_s.min(config.stable_step_s()) }
+    /// Every sample, in steps of the model's length at most, but for [`LONGER_INTERVAL`] and [`JITTER`].
+    pub fn whole(model: &JointModel, input: &ReplayInput, config: &PlantConfig) -> Self {
+        Self::of(1, input, model.step_s.min(config.stable_step_s()))
     }
 
     /// As many samples at a time, and steps as long, as the plant bears, up to the model's stride.
     pub fn rough(model: &JointModel, input: &ReplayInput, config: &PlantConfig) -> Self {
         if model.guide_stride <= 1 {
-            return Self::whole(model, config);
+            return Self::whole(model, input, config);
         }
         let longest_s =
             (model.guide_stride as f64 * model.step_s).min(NEARER_TO_STABILITY * config.stable_step_s());
         let samples = (longest_s / input.step_s + 1e-6).floor();
-        Self { stride: (samples as usize).max(1), longest_s }
+        Self::of((samples as usize).max(1), input, longest_s)
+    }
+
+    fn of(stride: usize, input: &ReplayInput, longest_s: f64) -> Self {
+        let span_s = stride as f64 * input.step_s;
+        Self { stride, usual_s: span_s / steps_in(span_s / longest_s, LONGER_INTERVAL) }
     }
 }
 
@@ -65,7 +76,7 @@ impl Run<'_> {
     pub fn execute(&self, guide: Guide<'_>, outputs: &[Channel], sink: &mut impl Sink) {
         let input = self.input;
         let n = input.t_s.len();
-        let Pace { stride, longest_s } = self.pace;
+        let Pace { stride, usual_s } = self.pace;
         let effects = self.config.effects();
         let mut states = FRESH_STATES;
         let guiding = self.model.guiding_channel();
@@ -100,7 +111,7 @@ impl Run<'_> {
             if k > 0 {
                 let from_rad = wanted_rad;
                 wanted_rad = theta_in_rad(k, span_s);
-                let steps = steps_in(span_s / longest_s);
+                let steps = steps_in(span_s / usual_s, JITTER);
                 let dt_s = span_s / steps;
                 for sub in 1..=steps as usize {
                     // Where the recording stands after a part of the steps between two samples.
@@ -213,10 +224,36 @@ impl<'a> Recorded<'a> {
     }
 }
 
-/// Steps between two samples that lie `longest` of the longest steps apart.
+/// Steps between two samples that lie so many of the wanted steps apart, each longer than these by the part `longer` at most.
 #[inline]
-fn steps_in(longest: f64) -> f64 {
-    let whole = longest - 1e-9;
+fn steps_in(wanted: f64, longer: f64) -> f64 {
+    let whole = wanted - longer;
     // Rounding up is a call.
     if whole > 1.0 { whole.ceil() } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{JITTER, LONGER_INTERVAL, Pace, steps_in};
+    use crate::joint_model::JointModel;
+    use crate::simulation::ReplayInput;
+    use crate::test_bench;
+
+    /// Intervals of 0.7 to 1.3 times the usual one are as many steps as that; two rows that are lost are two more.
+    #[test]
+    fn a_clock_that_jitters_takes_no_more_steps_than_an_even_one() {
+        let recording = test_bench::swung(3000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let input = ReplayInput::new(&model, &recording).unwrap();
+        let interval_s = input.step_s;
+        for (longest, steps) in [(1.0, 1.0), (0.5, 2.0), (0.93, 1.0), (0.89, 2.0), (0.9995, 1.0)] {
+            let pace = Pace::of(1, &input, longest * interval_s);
+            let in_intervals = |intervals: f64| steps_in(intervals * interval_s / pace.usual_s, JITTER);
+            assert_eq!([in_intervals(1.0), in_intervals(3.0)], [steps, 3.0 * steps], "even, {longest}");
+            if steps == 1.0 {
+                assert_eq!([0.7, 1.3, 1.5].map(in_intervals), [1.0, 1.0, 2.0], "{longest}");
+            }
+        }
+        assert_eq!([steps_in(1.09, LONGER_INTERVAL), steps_in(1.11, LONGER_INTERVAL)], [1.0, 2.0]);
+    }
 }
