@@ -491,6 +491,14 @@ impl Search<'_> {
         }
     }
 
+    /// The same to compare with another model of loss `other_loss`, as far as that takes.
+    fn without_exhausted_beside(&self, present: &Fitted, other_loss: f64) -> Result<Fitted, Failure> {
+        match present.layout.without_exhausted(self.believed, &present.solution.model) {
+            Some((layout, without)) => self.fit_beside(layout, &without, other_loss),
+            None => Ok(present.clone()),
+        }
+    }
+
     /// `present` with the nuisance terms in addition to the selected effects.
     fn with_ordinary(&self, present: Fitted) -> Result<Fitted, Failure> {
         let (layout, with) = present.layout.with_ordinary(&present.solution.model);

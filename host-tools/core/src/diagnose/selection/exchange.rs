@@ -6,6 +6,7 @@
 use bowden_model::effect::{ActiveEffect, Component};
 
 use super::{Chosen, Explanation, Fitted, Search, Tried, instances, is_further, remove};
+use crate::diagnose::onset::moment_of;
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
@@ -109,7 +110,11 @@ impl Search<'_> {
         let mut fits = Vec::new();
         for tried in &rivals[..most] {
             let (layout, with) = layout.with(&without, tried.effect);
-            fits.push(self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?);
+            fits.push(if moment_of(&tried.effect).is_some() {
+                self.fit(layout, &with, &[COARSE_STEP, FINE_STEP])?
+            } else {
+                self.fit_beside(layout, &with, present.loss)?
+            });
             self.progress.advance(1);
         }
         rivals.extend(rest);

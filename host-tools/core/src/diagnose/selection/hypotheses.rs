@@ -69,9 +69,9 @@ impl Search<'_> {
         }
         let before = self.without_exhausted(nothing)?;
         let predictions = self.objective.predict(&before.solution.model)?;
-        let (_, laws) = self.one_more(&before, Kind::Law, PROMISING)?;
+        let (_, laws) = self.one_more(&before, Kind::Law, PROMISING, None)?;
         let closed_form = laws.first().map(|law| rival(law.newest().descriptor().id, law));
-        let (_, names) = self.one_more(&before, Kind::Name, PROMISING)?;
+        let (_, names) = self.one_more(&before, Kind::Name, PROMISING, None)?;
         let mut names = names.iter().filter(|name| hypothesis::of(&name.newest()).is_none());
         let catalogue = names.next().map(|name| rival(name.newest().descriptor().id, name));
         let mut trials = Vec::new();

@@ -1,6 +1,7 @@
 //! Selection of laws, in place of named effects or in addition to them. Laws are tried once no further effect is found, and must reduce the
 //! loss by more than an effect must.
 
+use super::trying::drives_tendons;
 use super::{Explanation, Fitted, Kind, PROMISING, Round, Search, Worth, remove};
 use crate::diagnose::candidates::seen_on;
 use crate::diagnose::law_candidates::law_candidates;
@@ -93,8 +94,9 @@ impl Search<'_> {
             };
             let before = self.without_exhausted(&beside)?;
             let removed_share = 1.0 - present.loss / before.loss;
-            let (record, fits) =
-                self.one_more(&before, Kind::Law, (RIVALLING * removed_share).max(PROMISING))?;
+            let promising = (RIVALLING * removed_share).max(PROMISING);
+            let names_loss = drives_tendons(&present.solution.model).then_some(present.loss);
+            let (record, fits) = self.one_more(&before, Kind::Law, promising, names_loss)?;
             rounds.push(Round { loss_before: before.loss, candidates: record });
             if let Some((found, with)) = self.found(&before, &beside, fits, Policy::worth_stating)?
                 && with.shows(present, &with.newest(), |without, with| better(&POLICY, without, with))
@@ -118,7 +120,7 @@ impl Search<'_> {
             // If a free form has already located a remaining structure, a law of that component needs no more than an effect.
             let left = unexplained(self.objective, None, &now.fit.solution.model)?;
             let before = self.without_exhausted(&now.fit)?;
-            let tried = self.one_more(&before, Kind::Law, PROMISING)?;
+            let tried = self.one_more(&before, Kind::Law, PROMISING, None)?;
             let there = |fitted: &Fitted| {
                 let component = fitted.newest().descriptor().component.name();
                 left.as_ref().is_some_and(|left| left.component == component)

@@ -8,7 +8,6 @@ use super::{
     instances, is_further, remove,
 };
 use crate::diagnose::policy::POLICY;
-use crate::fit::solver::{COARSE_STEP, FINE_STEP};
 use crate::outcome::Failure;
 
 /// Maximum number of named effects.
@@ -50,7 +49,7 @@ impl Search<'_> {
     ) -> Result<(), Failure> {
         while now.names() < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(&now.fit)?;
-            let tried = self.one_more(&before, Kind::Name, PROMISING)?;
+            let tried = self.one_more(&before, Kind::Name, PROMISING, None)?;
             if !self.add_best(&before, tried, now, rounds, worth)? {
                 break;
             }
@@ -116,8 +115,14 @@ impl Search<'_> {
         let shows = |fitted: &Fitted| fitted.shows(before, &fitted.newest(), worth_it);
         fits.sort_by_key(|fitted| !shows(fitted));
         let showing = fits.iter().take_while(|fitted| shows(fitted)).count();
+        // Where the first were taken out, the next may be a coarse fit.
+        let interrupted = self.progress.interrupted();
+        if let Some(first) = fits[..showing].first_mut().filter(|first| !first.finished && !interrupted) {
+            *first = self.finish(first)?;
+        }
         let finalists = if before.layout == present.layout { 1 } else { FINALISTS };
-        let finalists = &fits[..finalists.min(showing)];
+        let count = |fitted: &&Fitted| fitted.finished || interrupted;
+        let finalists = &fits[..fits[..finalists.min(showing)].iter().take_while(count).count()];
         let mut beside: Vec<Fitted> = finalists
             .par_iter()
             .map(|fitted| self.with_ordinary(fitted.clone()))
@@ -171,8 +176,8 @@ impl Search<'_> {
             }
             let instances = instances(chosen, index);
             let (layout, without) = present.without(&instances);
-            let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
-            let bare = self.without_exhausted(&rest)?;
+            let rest = self.fit_beside(layout, &without, present.loss)?;
+            let bare = self.without_exhausted_beside(&rest, present.loss)?;
             self.progress.advance(1);
             let is_worth = |without, with| POLICY.worth_naming(without, with);
             let is_worth_its_place = present.shows(&bare, &chosen[index].effect, is_worth)
@@ -182,7 +187,7 @@ impl Search<'_> {
                 index += 1;
             } else {
                 remove(chosen, &instances);
-                *present = rest;
+                *present = if rest.finished { rest } else { self.finish(&rest)? };
             }
         }
         Ok(())

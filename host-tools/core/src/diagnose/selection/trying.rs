@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
 use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
+use crate::diagnose::layout::Layout;
 use crate::diagnose::one_body::turns_as_one;
 use crate::diagnose::onset::{between_recordings, moment_of};
 use crate::diagnose::screening::{Present, Screened, screen};
-use crate::fit::solver::{FINE_STEP, Known, Slopes, solve_for_ranking};
+use crate::fit::solver::{COARSE_STEP, FINE_STEP, Known, Slopes, solve_for_ranking};
+use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
 use crate::simulation::Prediction;
 
@@ -18,18 +20,35 @@ const FITTED: usize = 7;
 /// Loss relative to the best above which a candidate is not fitted to convergence.
 const BEHIND: f64 = 2.5;
 
+/// The same where a motor drives tendons, but for an effect that begins at a moment, which convergence shifts. A rival that leaves 42 % more is
+/// not listed ([`POLICY`](crate::diagnose::policy::POLICY)), and by convergence a candidate gains on another by up to a fifth there.
+const BEHIND_OF_TENDONS: f64 = 1.7;
+
+/// Loss relative to that of what a candidate would replace above which it is not fitted to convergence: it has to do better in the end.
+const FAR_BEHIND: f64 = 2.5;
+
+/// The same for an effect that begins at a moment, where a motor drives tendons; elsewhere there is no bound.
+const FAR_BEHIND_AT_A_MOMENT: f64 = 10.0;
+
+/// Loss relative to that of a model above which a coarse fit without one of its effects, or with another in its place, is not fitted to
+/// convergence. Of a motor that drives tendons convergence takes a fifth off at most; harmonics of the torque that turns a prescribed angle are found by
+/// it alone.
+const DECIDED: f64 = 5.0;
+
 /// Minimum reduction of the loss, relative to the estimate of screening, by a fit that reuses the sensitivities of the present model; a
 /// candidate below it is refitted with its own sensitivities.
 const KEPT_PROMISE: f64 = 0.5;
 
 impl Search<'_> {
     /// Tries every further effect in addition to those of `present`: screens all, fits the first coarsely, and fits the best of these to
-    /// convergence, provided that the estimated reduction reaches `promising`. Returns all candidates for the record, and the fits, best first.
+    /// convergence, provided that the estimated reduction reaches `promising`. Candidates whose coarse fit is far behind `other_loss`, the
+    /// loss of what they would replace, are not among the fits. Returns all candidates for the record, and the fits, best first.
     pub(super) fn one_more(
         &self,
         present: &Fitted,
         kind: Kind,
         promising: f64,
+        other_loss: Option<f64>,
     ) -> Result<(Vec<Attempted>, Vec<Fitted>), Failure> {
         let predictions = self.objective.predict(&present.solution.model)?;
         let model = present.without_ordinary();
@@ -41,11 +60,10 @@ impl Search<'_> {
             }
             Kind::Law => law_candidates(None, &model, self.objective, &predictions),
         };
-        self.best_of(present, &predictions, &all, promising, None)
+        self.best_of(present, &predictions, &all, promising, other_loss)
     }
 
-    /// The same for the given candidates; `predictions` are those of `present`. Candidates whose coarse fit is far behind `other_loss`, the
-    /// loss of what they would replace, are not among the fits.
+    /// The same for the given candidates; `predictions` are those of `present`.
     pub(super) fn best_of(
         &self,
         present: &Fitted,
@@ -83,11 +101,18 @@ impl Search<'_> {
             keep(*place, fitted);
         }
         // Convergence shifts a moment far, and little else.
-        let is_behind = |fitted: &Fitted| other_loss.is_some_and(|other| fitted.loss > BEHIND * other);
-        fits.retain(|(_, fitted)| !is_behind(fitted) || moment_of(&fitted.newest()).is_some());
+        let is_within = |fitted: &Fitted, other_loss: f64, [of_others, at_a_moment]: [f64; 2]| {
+            let begins = moment_of(&fitted.newest()).is_some();
+            fitted.loss <= other_loss * if begins { at_a_moment } else { of_others }
+        };
+        let tendons = drives_tendons(&present.solution.model);
+        let far_behind = [FAR_BEHIND, if tendons { FAR_BEHIND_AT_A_MOMENT } else { f64::INFINITY }];
+        fits.retain(|(_, fitted)| other_loss.is_none_or(|other| is_within(fitted, other, far_behind)));
         best_first(&mut fits);
-        let farthest = fits.first().map_or(0.0, |(_, best)| BEHIND * best.loss);
-        let ahead = fits.iter().take(FINALISTS).take_while(|(_, fitted)| fitted.loss <= farthest).count();
+        let best_loss = fits.first().map_or(0.0, |(_, best)| best.loss);
+        let behind = if tendons { BEHIND_OF_TENDONS } else { BEHIND };
+        let is_ahead = |fitted: &Fitted| is_within(fitted, best_loss, [behind, BEHIND]);
+        let ahead = fits.iter().take(FINALISTS).take_while(|(_, fitted)| is_ahead(fitted)).count();
         fits[..ahead].par_iter_mut().try_for_each(|(_, fitted)| {
             if !progress.interrupted() {
                 *fitted = self.finish(fitted)?;
@@ -109,11 +134,27 @@ impl Search<'_> {
         Ok((record, fits.into_iter().map(|(_, fitted)| fitted).collect()))
     }
 
-    fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
+    /// Fits a coarsely fitted candidate to convergence.
+    pub(super) fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
         let finished = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])?;
         let model = &finished.solution.model;
         let unseen = between_recordings(self.objective, model, model.effects.len() - 1)?;
         Ok(Fitted { unseen, ..finished })
+    }
+
+    /// Fit of a model to compare with another of loss `other_loss`: to convergence, unless a motor drives tendons and the coarse fit is so
+    /// far behind that convergence would decide nothing.
+    pub(super) fn fit_beside(
+        &self,
+        layout: Layout,
+        model: &JointModel,
+        other_loss: f64,
+    ) -> Result<Fitted, Failure> {
+        let coarse = self.fit(layout, model, &[COARSE_STEP])?;
+        if drives_tendons(model) && coarse.loss > DECIDED * other_loss {
+            return Ok(Fitted { finished: false, ..coarse });
+        }
+        self.fit(coarse.layout, &coarse.solution.model, &[FINE_STEP])
     }
 
     /// Coarse fits, sufficient for ranking, of `present` with each of the candidates, and their indices.
@@ -174,5 +215,54 @@ impl Search<'_> {
         let known = Known { jacobian: jacobian.as_ref(), spread: slopes.spread };
         let solution = solve_for_ranking(self.objective, &with, &free, PATIENCE, &known)?;
         Ok(self.judged(layout, solution, false))
+    }
+}
+
+/// Whether a motor drives tendons by the duty of its bridge: what a coarse fit leaves there tells what convergence will leave.
+pub(super) fn drives_tendons(model: &JointModel) -> bool {
+    model.parameters.tendon.is_some() && model.drive().is_ok_and(|drive| drive == Drive::GuidedMotor)
+}
+
+#[cfg(test)]
+mod tests {
+    use bowden_model::channel::Channel;
+    use bowden_model::effect::ActiveEffect;
+    use bowden_model::effects::find;
+
+    use super::super::Asked;
+    use super::*;
+    use crate::fit::objective::Objective;
+    use crate::progress::Quiet;
+    use crate::simulation::{ReplayInput, replay};
+    use crate::test_bench;
+
+    /// The bench has a spring. Beside the loss with it the fit without it is far behind and stays coarse; beside its own loss it is
+    /// the one that all rounds find.
+    #[test]
+    fn a_fit_goes_on_to_convergence_unless_it_is_far_behind() {
+        let mut recording = test_bench::swung(3000);
+        recording.set(Channel::Duty, vec![0.0; 3000]);
+        recording.set(Channel::BusVoltage, vec![24.0; 3000]);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        assert!(drives_tendons(&model));
+        let spring =
+            ActiveEffect::with_defaults(find("joint_spring").unwrap()).with("stiffness_nm_per_rad", 0.5);
+        let real = JointModel { effects: vec![spring], ..model.clone() };
+        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let asked = Asked::default();
+        let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
+        let layout = Layout::of(&model);
+        let whole = search.fit(layout.clone(), &model, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let coarse = search.fit(layout.clone(), &model, &[COARSE_STEP]).unwrap();
+        let beside = |other_loss| search.fit_beside(layout.clone(), &model, other_loss).unwrap();
+        let far_behind = beside(0.9 * coarse.loss / DECIDED);
+        assert_eq!((far_behind.finished, far_behind.loss), (false, coarse.loss));
+        let near = beside(1.1 * coarse.loss / DECIDED);
+        assert!(near.finished && near.loss < coarse.loss, "{}, coarse {}", near.loss, coarse.loss);
+        assert!((near.loss / whole.loss - 1.0).abs() < 1e-3, "{}, in one {}", near.loss, whole.loss);
     }
 }
