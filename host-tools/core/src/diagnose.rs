@@ -241,11 +241,19 @@ impl Case<'_> {
         };
         let unfaded = |mut selected: Selected| {
             let mut last = refined(&selected)?;
+            let mut intervals_count = true;
             while let Some(fewer) =
-                selected.complete.then(|| selected.without_faded(objective, &last)).flatten()
+                selected.complete.then(|| selected.without_faded(objective, &last, intervals_count)).flatten()
             {
-                selected = fewer;
-                last = refined(&selected)?;
+                let left = refined(&fewer)?;
+                let [without, with] =
+                    [&left, &last].map(|fitted| objective.mean_loss(&fitted.residuals, Part::Training));
+                // An interval is as wide as two parameters are alike, and contains zero also where what it belongs to is missing.
+                if intervals_count && POLICY.worth_naming(without, with) {
+                    intervals_count = false;
+                    continue;
+                }
+                (selected, last) = (fewer, left);
             }
             Ok::<_, Failure>((selected, last))
         };

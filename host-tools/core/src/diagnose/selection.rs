@@ -209,13 +209,18 @@ impl Selected {
     }
 
     /// The same search without the effects that are negligible in `fitted`, the fit to `objective` at the rig's own resolution; `None` if
-    /// none is. An effect whose remainder is another effect of the catalogue is replaced by that, also if the 90 % interval of its strength
-    /// contains zero.
+    /// none is. An effect whose remainder is another effect of the catalogue is replaced by that; where `intervals_count`, also if the 90 %
+    /// interval of its strength contains zero.
     ///
     /// The search simulates coarsely, and an effect may only compensate the discretisation error: a spring of a few mN·m/rad was ten times as
     /// strong there.
     #[must_use]
-    pub fn without_faded(&self, objective: &Objective, fitted: &Solution) -> Option<Self> {
+    pub fn without_faded(
+        &self,
+        objective: &Objective,
+        fitted: &Solution,
+        intervals_count: bool,
+    ) -> Option<Self> {
         let believed = &self.baseline.model;
         let layout = Layout::of(believed);
         let mut left = self.clone();
@@ -226,7 +231,7 @@ impl Selected {
             let first = layout.values_of_found(&fitted.model, index).start;
             let std = fitted.slopes().stds.get(first).copied().flatten();
             let may_be_zero = std.is_some_and(|std| POLICY.may_be_zero(effect.parameters[0], std));
-            let only_the_remainder = may_be_zero && remainder.is_some();
+            let only_the_remainder = intervals_count && may_be_zero && remainder.is_some();
             if !negligible(objective, believed, effect) && !only_the_remainder {
                 continue;
             }
@@ -541,10 +546,16 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
     }
 }
 
-/// The effect of the catalogue that remains of a negligible one, if any.
+/// The effect of the catalogue that remains of a negligible one, if any, with what was fitted to parameters of the same name.
 fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffect> {
     let (id, strength) = effect.effect.remainder(&effect.parameters)?;
     let mut other = ActiveEffect { target: effect.target, bench: effect.bench, ..sized(believed, find(id)?) };
+    for (parameter, value) in effect.descriptor().parameters.iter().zip(effect.parameters) {
+        let named = other.descriptor().parameters.iter().position(|one| one.name == parameter.name);
+        if let Some(place) = named {
+            other.parameters[place] = value;
+        }
+    }
     other.parameters[0] = strength;
     Some(other)
 }

@@ -58,6 +58,7 @@ fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
         ActiveEffect::with_defaults(find("motor_stribeck_friction").unwrap())
             .with("excess_nm", excess_nm)
             .with("coulomb_nm", coulomb_nm)
+            .with("presliding_rad", 0.002)
     };
     let with = |effect| JointModel { effects: vec![effect], ..bench.clone() };
     let found = falling(0.5, 0.07);
@@ -76,16 +77,19 @@ fn friction_that_no_longer_falls_with_speed_becomes_dry_friction() {
         ..nothing_found(&bench)
     };
     let calibrated = Layout::of(&bench).calibrated(&bench).len();
-    let left_of = |excess_nm: f64, coulomb_nm: f64, excess_std_nm: f64| {
+    let left_where = |intervals_count, excess_nm: f64, coulomb_nm: f64, excess_std_nm: f64| {
         let mut stds = vec![Some(1e9); calibrated];
         stds.extend([Some(excess_std_nm), Some(1e9), Some(1e9)]);
         let model = with(falling(excess_nm, coulomb_nm));
-        selected.without_faded(&objective, &solution(model, stds))
+        selected.without_faded(&objective, &solution(model, stds), intervals_count)
     };
+    let left_of = |excess_nm, coulomb_nm, std_nm| left_where(true, excess_nm, coulomb_nm, std_nm);
     assert!(left_of(0.5, 0.07, 0.3).is_none());
     // The 90 % interval contains zero from a standard deviation of 0.304 on.
     let unsure = left_of(0.5, 0.07, 0.305).unwrap();
     assert_eq!(unsure.model.effects[0].descriptor().id, "motor_coulomb_friction");
+    assert_eq!(unsure.model.effects[0].parameters[1], 0.002, "it builds up over the same turn");
+    assert!(left_where(false, 0.5, 0.07, 0.305).is_none(), "where it is missing the loss says so");
     let left = left_of(0.026, 0.159, 1e-3).unwrap();
     let [dry] = left.model.effects[..] else { panic!("{:?}", left.model.effects) };
     assert_eq!((dry.descriptor().id, dry.parameters[0]), ("motor_coulomb_friction", 0.159));
