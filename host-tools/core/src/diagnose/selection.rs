@@ -123,9 +123,9 @@ impl Chosen {
         self.effect = other;
     }
 
-    /// The same effect in another kind, as `with` has it last; its rivals keep their losses.
-    fn takes_kind(&mut self, with: &Fitted) {
-        self.effect = with.newest();
+    /// The same effect in another kind, as `with` has it at `place`; its rivals keep their losses.
+    fn takes_kind(&mut self, with: &Fitted, place: usize) {
+        self.effect = with.solution.model.effects[place];
         self.model = with.without_ordinary();
         self.loss_after = with.loss_on(self.effect.bench);
         self.compared[1] = with.solution.model.clone();

@@ -2,7 +2,8 @@
 //! ever more slowly.
 //!
 //! The other kind is tried as soon as the effect is found, because what the wrong one leaves has the form of yet another effect: at the rests
-//! of a staircase that of a weight that was changed.
+//! of a staircase that of a weight that was changed. While much else is missing the recordings may not tell the kinds apart: once all effects
+//! are known the other kinds are tried again.
 
 use super::{Explanation, PATIENCE, Search, handicap};
 use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
@@ -11,10 +12,18 @@ use crate::outcome::Failure;
 impl Search<'_> {
     /// Replaces the kind of the effect that was found last by the likeliest one.
     pub(super) fn choose_kind(&self, now: &mut Explanation) -> Result<(), Failure> {
+        now.chosen.len().checked_sub(1).map_or(Ok(()), |last| self.choose_kind_of(last, now))
+    }
+
+    /// The same for all effects but the last, with all of them known.
+    pub(super) fn choose_kinds_again(&self, now: &mut Explanation) -> Result<(), Failure> {
+        (0..now.chosen.len().saturating_sub(1)).try_for_each(|index| self.choose_kind_of(index, now))
+    }
+
+    fn choose_kind_of(&self, index: usize, now: &mut Explanation) -> Result<(), Failure> {
         let Explanation { fit: present, chosen } = now;
-        let Some(newest) = chosen.last_mut() else { return Ok(()) };
-        let place = present.newest_place();
-        let found = present.newest();
+        let place = present.layout.first_found() + index;
+        let found = present.solution.model.effects[place];
         let Some(spec) = found.descriptor().parameters.iter().find(|spec| spec.is_choice) else {
             return Ok(());
         };
@@ -26,7 +35,7 @@ impl Search<'_> {
             let mut model = present.solution.model.clone();
             model.effects[place] = other;
             let likelier = |loss: f64, others_loss: f64| {
-                handicap(&other) * others_loss < handicap(&present.newest()) * loss
+                handicap(&other) * others_loss < handicap(&present.solution.model.effects[place]) * loss
             };
             // With the slopes of the other kind, in a third of the simulations.
             let slopes = present.solution.slopes();
@@ -41,7 +50,7 @@ impl Search<'_> {
             if likelier(present.loss_on(found.bench), with.loss_on(found.bench))
                 && self.holds_across_recordings(present, &with, likelier)?
             {
-                newest.takes_kind(&with);
+                chosen[index].takes_kind(&with, place);
                 *present = with;
             }
         }
@@ -67,6 +76,39 @@ mod tests {
     fn friction(exponent: f64) -> ActiveEffect {
         let effect = ActiveEffect::with_defaults(find("joint_coulomb_friction").unwrap());
         effect.with("torque_nm", 0.3).with("presliding_rad", 4e-3).with("presliding_exponent", exponent)
+    }
+
+    /// Found as a spring up to its level while a spring was missing, friction becomes what it is once that is known.
+    #[test]
+    fn kinds_are_chosen_again_once_all_effects_are_known() {
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let spring =
+            ActiveEffect::with_defaults(find("joint_spring").unwrap()).with("stiffness_nm_per_rad", 0.5);
+        let real = JointModel { effects: vec![friction(1.0), spring], ..model.clone() };
+        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
+        for (channel, values) in measured.channels() {
+            recording.set(channel, values.to_vec());
+        }
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let asked = Asked::default();
+        let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
+        let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP]).unwrap();
+        let (layout, with) = nothing.layout.with(&model, friction(0.0));
+        let first = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let (layout, with) = first.layout.with(&first.solution.model, spring);
+        let both = search.fit(layout, &with, &[COARSE_STEP, FINE_STEP]).unwrap();
+        let loss_before = both.loss;
+        let chosen = vec![
+            Chosen::newest_of(&first, &nothing, Vec::new()),
+            Chosen::newest_of(&both, &first, Vec::new()),
+        ];
+        let mut now = Explanation { fit: both, chosen };
+        search.choose_kinds_again(&mut now).unwrap();
+        let [rubbing, springy] = &now.chosen[..] else { panic!("{}", now.chosen.len()) };
+        assert_eq!((rubbing.effect.parameters[2], springy.effect.descriptor().id), (1.0, "joint_spring"));
+        assert_eq!(now.fit.solution.model.effects[now.fit.layout.first_found()], rubbing.effect);
+        assert!(now.fit.loss < 0.5 * loss_before, "{loss_before} to {}", now.fit.loss);
     }
 
     /// Found as a spring up to its level, it becomes what it is, with the turn over which it builds up; and a spring stays one.

@@ -57,6 +57,7 @@ impl Search<'_> {
             self.add_instances(now)?;
             self.add_on_other_benches(now, rounds, worth)?;
         }
+        self.choose_kinds_again(now)?;
         self.exchange(now)?;
         if self.progress.interrupted() { Ok(()) } else { self.prune(now) }
     }
