@@ -48,6 +48,16 @@ pub(crate) fn turned(samples: u32, effects: &[ActiveEffect]) -> Recording {
     recording
 }
 
+/// `recording` with what `model` does in it with `effects`.
+pub(crate) fn measured(model: &JointModel, recording: Recording, effects: &[ActiveEffect]) -> Recording {
+    let real = JointModel { effects: effects.to_vec(), ..model.clone() };
+    let input = ReplayInput::new(model, &recording).expect("its input");
+    let measured = replay(&real, &input).expect("a replay");
+    measured
+        .channels()
+        .fold(recording, |recording, (channel, values)| recording.with(channel, values.to_vec()))
+}
+
 /// A joint that is `share` as strong and as heavy, at the same angles, duties and currents: every torque and force is that share.
 pub(crate) fn smaller(mut model: JointModel, share: f64) -> JointModel {
     for parameter in NOMINAL_PARAMETERS.iter().filter(|p| UNITS_OF_STRENGTH.contains(&p.spec.unit)) {

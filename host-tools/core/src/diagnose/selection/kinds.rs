@@ -69,7 +69,6 @@ mod tests {
     use crate::fit::solver::{COARSE_STEP, FINE_STEP};
     use crate::joint_model::JointModel;
     use crate::progress::Quiet;
-    use crate::simulation::{ReplayInput, replay};
     use crate::test_bench;
 
     /// Friction of the joint that builds up over 4 mrad with this exponent.
@@ -81,15 +80,11 @@ mod tests {
     /// Found as a spring up to its level while a spring was missing, friction becomes what it is once that is known.
     #[test]
     fn kinds_are_chosen_again_once_all_effects_are_known() {
-        let mut recording = test_bench::swung(6000);
+        let recording = test_bench::swung(6000);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let spring =
             ActiveEffect::with_defaults(find("joint_spring").unwrap()).with("stiffness_nm_per_rad", 0.5);
-        let real = JointModel { effects: vec![friction(1.0), spring], ..model.clone() };
-        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
-        for (channel, values) in measured.channels() {
-            recording.set(channel, values.to_vec());
-        }
+        let recording = test_bench::measured(&model, recording, &[friction(1.0), spring]);
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let asked = Asked::default();
         let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
@@ -115,13 +110,9 @@ mod tests {
     #[test]
     fn dry_friction_becomes_the_kind_that_the_recording_shows() {
         for exponent in [0.0, 1.0] {
-            let mut recording = test_bench::swung(6000);
+            let recording = test_bench::swung(6000);
             let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-            let real = JointModel { effects: vec![friction(exponent)], ..model.clone() };
-            let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
-            for (channel, values) in measured.channels() {
-                recording.set(channel, values.to_vec());
-            }
+            let recording = test_bench::measured(&model, recording, &[friction(exponent)]);
             let objective = Objective::new(&model, &[recording], &[], true).unwrap();
             let asked = Asked::default();
             let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };

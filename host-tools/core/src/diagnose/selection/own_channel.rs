@@ -95,23 +95,18 @@ mod tests {
     use crate::fit::objective::Objective;
     use crate::fit::solver::COARSE_STEP;
     use crate::progress::Quiet;
-    use crate::simulation::{ReplayInput, replay};
     use crate::test_bench;
 
     /// A gain of 1.1 beside a spring, before it and behind it; the spring is no sensor.
     #[test]
     fn what_a_sensor_changes_of_its_own_does_not_depend_on_its_place() {
-        let mut recording = test_bench::swung(3000);
+        let recording = test_bench::swung(3000);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
         let usual = |id| ActiveEffect::with_defaults(find(id).unwrap());
         let spring = usual("joint_spring");
         let gain = ActiveEffect { target: Target::One(Channel::F2), ..usual("sensor_gain_error") };
         let gain = gain.with("gain", 1.1);
-        let real = JointModel { effects: vec![spring, gain], ..model.clone() };
-        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
-        for (channel, values) in measured.channels() {
-            recording.set(channel, values.to_vec());
-        }
+        let recording = test_bench::measured(&model, recording, &[spring, gain]);
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let (asked, believed) = (Asked::default(), &model);
         let search = Search { objective: &objective, believed, asked: &asked, progress: &Quiet };

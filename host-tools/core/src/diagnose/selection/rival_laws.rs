@@ -157,7 +157,6 @@ mod tests {
     use crate::fit::objective::Objective;
     use crate::joint_model::JointModel;
     use crate::progress::Quiet;
-    use crate::simulation::{ReplayInput, replay};
     use crate::test_bench;
 
     fn named(id: &str) -> ActiveEffect {
@@ -191,13 +190,9 @@ mod tests {
 
     /// What is left of these named effects on a bench whose physics is `real`.
     fn compared(real: &[ActiveEffect], names: &[ActiveEffect]) -> Vec<Chosen> {
-        let mut recording = test_bench::swung(6000);
+        let recording = test_bench::swung(6000);
         let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let with_real = JointModel { effects: real.to_vec(), ..model.clone() };
-        let measured = replay(&with_real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
-        for (channel, values) in measured.channels() {
-            recording.set(channel, values.to_vec());
-        }
+        let recording = test_bench::measured(&model, recording, real);
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let asked = Asked::default();
         let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };

@@ -233,7 +233,6 @@ mod tests {
     use super::*;
     use crate::fit::objective::Objective;
     use crate::progress::Quiet;
-    use crate::simulation::{ReplayInput, replay};
     use crate::test_bench;
 
     /// The bench has a spring. Beside the loss with it the fit without it is far behind and stays coarse; beside its own loss it is
@@ -247,11 +246,7 @@ mod tests {
         assert!(drives_tendons(&model));
         let spring =
             ActiveEffect::with_defaults(find("joint_spring").unwrap()).with("stiffness_nm_per_rad", 0.5);
-        let real = JointModel { effects: vec![spring], ..model.clone() };
-        let measured = replay(&real, &ReplayInput::new(&model, &recording).unwrap()).unwrap();
-        for (channel, values) in measured.channels() {
-            recording.set(channel, values.to_vec());
-        }
+        let recording = test_bench::measured(&model, recording, &[spring]);
         let objective = Objective::new(&model, &[recording], &[], true).unwrap();
         let asked = Asked::default();
         let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
