@@ -134,16 +134,25 @@ impl Plant {
         self.transmission.as_ref()
     }
 
-    /// Turns the joint, without inertia, to where the cables carry the weight at the present input angle.
+    /// Turns the joint, without inertia, to where the cables carry the weight at the present input angle, stretched and rubbing as the
+    /// effects on them have it at the start.
     ///
     /// A recording that starts away from the hanging position starts at rest there; how it got there is not known, so
     /// the friction state is the one after a slow approach from the unloaded position.
     pub fn settle(&mut self, config: &PlantConfig, input: &StepInput) {
-        if config.output() == OutputBoundary::Angle {
-            return;
-        }
         if let (Some(cables), Some(parts)) = (&mut self.transmission, config.transmission()) {
-            self.joint.settle(config, cables, parts, input.external_torque_nm);
+            let standing = PulleyMotion {
+                t_s: self.t_s,
+                dt_s: 0.0,
+                theta_in_rad: self.spindle.theta_rad,
+                omega_in_rad_s: 0.0,
+                theta_out_rad: self.joint.theta_rad,
+                omega_out_rad_s: 0.0,
+            };
+            cables.apply_effects(parts, config.effects(), &mut self.states, standing);
+            if config.output() != OutputBoundary::Angle {
+                self.joint.settle(config, cables, parts, input.external_torque_nm);
+            }
         }
     }
 

@@ -526,6 +526,8 @@ impl Case<'_> {
             };
             let recorded_s = objective.on(active.bench).duration_s();
             let mut named = named(active, chosen, heldout, &stds[values], recorded_s, separate);
+            // The clock of effects begins with the bench's first sample.
+            named.onset_s = named.onset_s.map(|onset_s| onset_s + objective.begins_at_s(active.bench));
             if let Some(bench) = self.bench_of(&active) {
                 named.sentence = words::on_bench(&bench, &named.sentence);
                 named.bench = Some(bench);

@@ -1,6 +1,6 @@
 //! Slow stretch under load: `τ dx/dt = ρ T / k - x` with end-to-end stiffness `k`, starting from what the pretension `F0`
 //! alone has done in the time before, `x = ρ/(1+ρ) F0/k (1 - exp(-(1+ρ) age/τ))`: the length between the pulleys is held,
-//! so that the tension falls by `k x` meanwhile.
+//! so that the tension falls by `k x` meanwhile. A recording that follows others of the bench begins later by their length.
 
 use crate::effect::{
     Component, Descriptor, Effect, EffectState, MAX_PARAMETERS, ParameterSpec, TransmissionPort,
@@ -18,14 +18,8 @@ static DESCRIPTOR: Descriptor = Descriptor {
     parameters: &[
         ParameterSpec::linear("ratio", "1", [0.0, 2.0], 0.15, "final creep over elastic elongation"),
         ParameterSpec::log("time_constant_s", "s", [0.05, 10000.0], 8.0, "time constant"),
-        ParameterSpec::linear(
-            "age_s",
-            "s",
-            [0.0, 1e9],
-            0.0,
-            "time under pretension before the simulation begins",
-        )
-        .not_searched(),
+        ParameterSpec::linear("age_s", "s", [0.0, 1e9], 0.0, "time under pretension before the clock begins")
+            .not_searched(),
     ],
     neutral: Some(0.0),
     channels: &[],
@@ -45,7 +39,7 @@ impl Effect for TendonCreep {
         let [lengths_m @ .., begun] = s;
         if *begun == 0.0 {
             *begun = 1.0;
-            let crept = p[0] / (1.0 + p[0]) * (1.0 - exp(-(1.0 + p[0]) * p[2] / p[1]));
+            let crept = p[0] / (1.0 + p[0]) * (1.0 - exp(-(1.0 + p[0]) * (p[2] + port.t_s) / p[1]));
             lengths_m.fill(crept * port.pretension_n / port.stiffness_n_per_m);
         }
         for (tendon, length_m) in port.tendons.iter_mut().zip(lengths_m) {

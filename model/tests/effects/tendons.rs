@@ -180,6 +180,11 @@ fn stretch_tells_the_effect() {
     near("crept before", run.tensions_n()[0], PRETENSION_N * (1.0 - 0.15 / 1.15 * done), 2e-3);
     draw(&mut run, 0.0, 120.0);
     near("and on", run.tensions_n()[0], PRETENSION_N / 1.15, 1e-5);
+    // At once, and as far 5 s after a clock that began at an age of 3 s.
+    let mut run = held(0.0, &[effect("tendon_creep").with("age_s", 3.0)]);
+    run.plant.set_time_s(5.0);
+    run.plant.settle(&run.config, &IDLE);
+    near("before the first step", run.tensions_n()[0], PRETENSION_N * (1.0 - 0.15 / 1.15 * done), 1e-9);
 
     // A fifth of the pretension after 10 s.
     let mut run = held(0.0, &[effect("pretension_loss")]);

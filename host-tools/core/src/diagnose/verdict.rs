@@ -60,7 +60,7 @@ pub struct NamedEffect {
     pub component: String,
     /// Probability that it is there.
     pub probability: f64,
-    /// When it began, s; `None` for one that is always there.
+    /// When it began, s, by the clock of the bench's first recording; `None` for one that is always there.
     pub onset_s: Option<f64>,
     /// Channel, for an effect of a sensor.
     pub channel: Option<String>,

@@ -318,6 +318,17 @@ impl Objective {
             .sum()
     }
 
+    /// Time of the first sample of a bench, s, by the clock of its recording; of several benches together 0, because their clocks are not one.
+    #[must_use]
+    pub fn begins_at_s(&self, bench: Option<u16>) -> f64 {
+        let is_of = |dataset: &&Arc<Dataset>| bench.is_none_or(|bench| dataset.bench == bench);
+        let [first, others @ ..] = &self.datasets.iter().filter(is_of).collect::<Vec<_>>()[..] else {
+            return 0.0;
+        };
+        let are_one = others.iter().all(|other| other.bench == first.bench);
+        if are_one { first.input.t_s().first().copied().unwrap_or(0.0) } else { 0.0 }
+    }
+
     /// Whether something was set differently in a recording that is fitted to.
     #[must_use]
     pub fn states_conditions(&self) -> bool {

@@ -25,6 +25,7 @@ pub struct ReplayInput {
     pub(super) torque_out_nm: Option<Arc<Vec<f64>>>,
     pub(super) start_rad: Option<f64>,
     pub(super) start_rad_s: f64,
+    /// Clock of the bench over that of the recording: the bench's begins at the first sample, wherever the recording's does.
     clock_offset_s: f64,
     pub(super) hold: Hold,
     /// Torque by the duty, root mean square, of a joint without tendons that its angle guides, N·m.
@@ -99,7 +100,7 @@ impl ReplayInput {
             torque_out_nm: take(Channel::TorqueOut)?,
             start_rad,
             start_rad_s,
-            clock_offset_s: 0.0,
+            clock_offset_s: -t_s.first().copied().unwrap_or(0.0),
             hold: Hold::of(model),
             driven_nm: model.guided_by.map(|_| model.driven_nm(recording)),
             step_s,
@@ -151,7 +152,7 @@ impl ReplayInput {
 
     /// States how long the bench had run before the first sample, s: what happened to it then has happened already.
     pub fn continues_after(&mut self, clock_s: f64) {
-        self.clock_offset_s = clock_s;
+        self.clock_offset_s = clock_s - self.t_s.first().copied().unwrap_or(0.0);
     }
 
     /// Clock of the bench at the first and at the last sample, s.

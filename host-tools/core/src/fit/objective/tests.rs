@@ -248,3 +248,42 @@ fn what_was_simulated_lately_is_recalled_bit_for_bit() {
         assert_eq!(joints.each_ref().map(|joint| asked_twice.residuals(joint).unwrap()), simulated);
     }
 }
+
+/// The clock of a bench begins at its first sample, whatever the recording's shows, and goes on in the recording that follows: friction that
+/// drifts and tendons that creep are where one recording of both has them.
+#[test]
+fn recordings_that_follow_one_another_are_on_one_clock() {
+    let whole = test_bench::swung(4000);
+    let model = JointModel::from_rig(&test_bench::rig(), &whole).unwrap();
+    let effect = |id: &str| ActiveEffect::with_defaults(find(id).unwrap());
+    let drift = effect("friction_drift").with("rate_per_s", 0.2);
+    let creep = effect("tendon_creep").with("time_constant_s", 1.5);
+    let aged = JointModel { effects: vec![drift, creep], ..model.clone() };
+    // Each half begins at rest, so that the second is compared with one that nothing but its age tells from the first.
+    let half = |begun_s: f64| {
+        let swung = test_bench::swung(2000);
+        let t_s = swung.t_s().iter().map(|t_s| begun_s + t_s).collect();
+        swung.channels().fold(Recording::new("half", t_s), |recording, channel| {
+            recording.with(channel, swung.channel(channel).unwrap().to_vec())
+        })
+    };
+    let seen = |begun_s: [f64; 2]| {
+        let objective = Objective::new(&model, &[half(begun_s[0])], &[half(begun_s[1])], true).unwrap();
+        assert_eq!(objective.begins_at_s(None), begun_s[0]);
+        objective.predict(&aged).unwrap()
+    };
+    let f1_n = |predictions: &[Prediction], recording: usize| {
+        predictions[recording].channel(Channel::F1).unwrap().to_vec()
+    };
+    let [plain, cut] = [seen([0.0, 0.0]), seen([5000.0, 7.0])];
+    for recording in 0..2 {
+        for (one, other) in f1_n(&plain, recording).iter().zip(f1_n(&cut, recording)) {
+            assert!((one - other).abs() < 1e-6, "{one} and {other}");
+        }
+    }
+    // What the pretension has lost in 1.999 s of creep by 15 %, before a sample has passed.
+    let crept = 0.15 / 1.15 * (1.0 - (-1.15_f64 * 1.999 / 1.5).exp());
+    let expected_n = test_bench::rig().joint.tendon.unwrap().pretension_n * (1.0 - crept);
+    let begins_n = f1_n(&plain, 1)[0];
+    assert!((begins_n - expected_n).abs() < 1e-6, "{begins_n} N, expected {expected_n}");
+}
