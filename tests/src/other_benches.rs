@@ -1,4 +1,4 @@
-//! Benches of other sizes and proportions than the nominal one, each with its own rig file: an effect, two or a law hidden in most, nothing in the rest.
+//! Benches of other sizes and proportions than the nominal one, each with its own rig file: effects or a law hidden in most, nothing in the rest.
 
 use std::fmt::Write;
 use std::fs::{self, File};
@@ -16,6 +16,7 @@ use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use virtual_bench::{BenchConfig, Case, ConcealedEffect, MotionKind, Size};
 
+use crate::prove::recorded::Recorded;
 use crate::prove::true_law::true_law;
 use crate::recording_of;
 
@@ -43,38 +44,53 @@ pub enum Hides {
     Effect,
     /// Two effects of the catalogue
     Two,
+    /// Four effects of the catalogue
+    Four,
     /// A law that no catalogue names
     Law,
 }
 
 impl Hides {
-    /// What a bench of this size hides, by seed.
-    fn drawn(self, seed: u64, size: &Size) -> Result<Vec<ConcealedEffect>, Failure> {
-        let mut ids: Vec<&str> = match self {
-            Self::Effect | Self::Two => {
-                ConcealedEffect::listed().filter(|id| *id != OF_THE_NOMINAL_BENCH).collect()
-            }
-            Self::Law => UNLISTED.to_vec(),
+    /// What a bench of this size hides, by seed, as far as `recorded` shows it: errors of channels that were not recorded are left out.
+    fn drawn(self, seed: u64, size: &Size, recorded: Recorded) -> Result<Vec<ConcealedEffect>, Failure> {
+        let (mut ids, count): (Vec<&str>, usize) = match self {
+            Self::Effect => (listed(), 1),
+            Self::Two => (listed(), 2),
+            Self::Four => (listed(), 4),
+            Self::Law => (UNLISTED.to_vec(), 1),
         };
         let mut random = Pcg64::new(u128::from(seed), 0xBE9C);
-        let count = if self == Self::Two { 2 } else { 1 };
         let mut hidden = Vec::new();
-        for _ in 0..count {
+        while hidden.len() < count && !ids.is_empty() {
             let id = ids.remove(Uniform::new(0, ids.len()).map_or(0, |uniform| uniform.sample(&mut random)));
-            hidden.push(ConcealedEffect::drawn(id, 1.0, seed).map_err(Failure::failed)?.sized(size));
+            let effect = ConcealedEffect::drawn(id, 1.0, seed).map_err(Failure::failed)?.sized(size);
+            let is_unseen =
+                channel_of(&effect).is_some_and(|name| recorded.missing().contains(&name.as_str()));
+            if !is_unseen {
+                hidden.push(effect);
+            }
         }
         Ok(hidden)
     }
 }
 
-/// The bench at `place` of the round, with what it hides.
+fn listed() -> Vec<&'static str> {
+    ConcealedEffect::listed().filter(|id| *id != OF_THE_NOMINAL_BENCH).collect()
+}
+
+/// Name of the channel that the effect acts on, if it is one of a sensor.
+fn channel_of(effect: &ConcealedEffect) -> Option<String> {
+    effect.parameters().get("channel").and_then(|name| name.as_str()).map(str::to_owned)
+}
+
+/// The bench at `place` of the round, with what it hides and `recorded` shows.
 ///
 /// # Errors
 /// When the virtual bench does not know an effect.
-pub fn drawn(hides: Hides, seed: u64, place: usize) -> Result<Case, Failure> {
+pub fn drawn(hides: Hides, seed: u64, place: usize, recorded: Recorded) -> Result<Case, Failure> {
     let bench = BenchConfig::drawn(seed);
-    let hidden =
-        if place % ROUND < ROUND - NOTHING { hides.drawn(seed, &Size::of(&bench))? } else { Vec::new() };
+    let is_hiding = place % ROUND < ROUND - NOTHING;
+    let hidden = if is_hiding { hides.drawn(seed, &Size::of(&bench), recorded)? } else { Vec::new() };
     Ok(Case::of_bench("bench", bench, hidden, seed, PERTURBED_PERCENT))
 }
 
@@ -87,9 +103,10 @@ pub struct Examined {
     pub diagnosis: Diagnosis,
 }
 
-/// The recording that is learned from, and that of another motion.
-fn recorded(case: &Case) -> Result<[virtual_bench::Recording; 2], Failure> {
+/// The recording that is learned from, and that of another motion, which holds everything.
+fn recordings(case: &Case, recorded: Recorded) -> Result<[virtual_bench::Recording; 2], Failure> {
     let training = case.train(MotionKind::Lab, TRAINING_S).map_err(Failure::failed)?;
+    let training = recorded.of(training, case.seed);
     let heldout = case.heldout(MotionKind::LabHeldout, HELDOUT_S, TRAINING_S).map_err(Failure::failed)?;
     Ok([training, heldout])
 }
@@ -98,13 +115,13 @@ fn recorded(case: &Case) -> Result<[virtual_bench::Recording; 2], Failure> {
 ///
 /// # Errors
 /// When the bench cannot be simulated or a file cannot be written.
-pub fn write(case: &Case, folder: &Path) -> Result<(), Failure> {
+pub fn write(case: &Case, recorded: Recorded, folder: &Path) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::failed(format!("{}: {error}", folder.display()));
     fs::create_dir_all(folder).map_err(failed)?;
     for (name, text) in [("rig.toml", case.rig_toml()), ("truth.json", case.truth_json())] {
         fs::write(folder.join(name), text).map_err(failed)?;
     }
-    for (name, recording) in ["train.csv", "heldout.csv"].iter().zip(recorded(case)?) {
+    for (name, recording) in ["train.csv", "heldout.csv"].iter().zip(recordings(case, recorded)?) {
         let file = File::create(folder.join(name)).map_err(failed)?;
         recording.write_csv(BufWriter::new(file)).map_err(failed)?;
     }
@@ -115,9 +132,9 @@ pub fn write(case: &Case, folder: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// When the bench cannot be simulated, and as [`diagnose`].
-pub fn examine(case: Case) -> Result<Examined, Failure> {
+pub fn examine(case: Case, recorded: Recorded) -> Result<Examined, Failure> {
     let rig = Rig::parse(&case.rig_toml(), "rig.toml")?;
-    let [training, heldout] = recorded(&case)?.map(|recorded| recording_of(&recorded));
+    let [training, heldout] = recordings(&case, recorded)?.map(|recorded| recording_of(&recorded));
     let study = Study::of_bench(rig, vec![training], vec![heldout]);
     let diagnosis = diagnose(&study, &[], &Quiet)?.findings.diagnosis;
     Ok(Examined { case, diagnosis })
@@ -125,9 +142,7 @@ pub fn examine(case: Case) -> Result<Examined, Failure> {
 
 /// Whether the named effect is the hidden one, on its channel.
 fn names(effect: &NamedEffect, hidden: &ConcealedEffect) -> bool {
-    let parameters = hidden.parameters();
-    let channel = parameters.get("channel").and_then(|name| name.as_str());
-    hidden.id() == effect.id && channel == effect.channel.as_deref()
+    hidden.id() == effect.id && channel_of(hidden) == effect.channel
 }
 
 /// Whether the law is the hidden one: where it acts and on what it depends.

@@ -1,13 +1,17 @@
 //! Benches of other sizes and proportions than the nominal one.
 
 use bowden_tests::other_benches::{Hides, drawn, examine};
+use bowden_tests::prove::recorded::Recorded;
+use virtual_bench::ConcealedEffect;
+
+const EVERYTHING: Recorded = Recorded::Everything;
 
 /// Their sheaths are bent elsewhere than those of the nominal bench. Taken to be bent evenly from pulley to pulley, they had tendons that stiffen
 /// beside what they hide.
 #[test]
 fn where_a_sheath_is_bent_is_not_taken_for_tendons_that_stiffen() {
     for (number, place, hidden) in [(104, 4, "presliding_compliance"), (205, 5, "motor_cogging")] {
-        let examined = examine(drawn(Hides::Effect, number, place).unwrap()).unwrap();
+        let examined = examine(drawn(Hides::Effect, number, place, EVERYTHING).unwrap(), EVERYTHING).unwrap();
         assert_eq!(examined.hidden(), [hidden]);
         assert!(examined.is_right(), "{number}: {}", examined.said());
         let bends =
@@ -25,7 +29,7 @@ fn where_a_sheath_is_bent_is_not_taken_for_tendons_that_stiffen() {
 /// The stop gets stiffer with depth and damps, and one of the two channels has an offset.
 #[test]
 fn channels_that_reach_the_end_of_their_scale_are_not_faulty() {
-    let mut examined = examine(drawn(Hides::Two, 100, 0).unwrap()).unwrap();
+    let mut examined = examine(drawn(Hides::Two, 100, 0, EVERYTHING).unwrap(), EVERYTHING).unwrap();
     assert_eq!(examined.hidden(), ["end_stop_contact", "sensor_offset"]);
     assert!(examined.is_right(), "{}", examined.said());
     let loss = &examined.diagnosis.heldout_loss;
@@ -38,7 +42,7 @@ fn channels_that_reach_the_end_of_their_scale_are_not_faulty() {
 /// Friction that loses 47 % in 40 s, at a rate that fades with 78 s: taken for a straight line, its errors in the 20 s after that are six times as large.
 #[test]
 fn friction_that_drifts_ever_more_slowly_is_foretold() {
-    let examined = examine(drawn(Hides::Effect, 6304, 4).unwrap()).unwrap();
+    let examined = examine(drawn(Hides::Effect, 6304, 4, EVERYTHING).unwrap(), EVERYTHING).unwrap();
     assert_eq!(examined.hidden(), ["friction_drift"]);
     assert!(examined.is_right(), "{}", examined.said());
     let drift = &examined.diagnosis.effects[0].parameters;
@@ -48,4 +52,26 @@ fn friction_that_drifts_ever_more_slowly_is_foretold() {
     assert!((left - 0.375).abs() < 0.05, "{left} of the friction is left");
     let loss = &examined.diagnosis.heldout_loss;
     assert!(loss.recalibrated > 30.0 && loss.after < 1.0, "{loss:?}");
+}
+
+/// Of an encoder-and-motor recording nobody can tell what is wrong with a tension channel, so that it is not hidden there; four effects are four.
+#[test]
+fn errors_of_channels_that_were_not_recorded_are_not_hidden() {
+    let hidden = |recorded: Recorded, seed| drawn(Hides::Four, seed, 0, recorded).unwrap().effects;
+    let [mut seen, mut unseen] = [0, 0];
+    for seed in 1..100 {
+        let is_of_tension = |effect: &&ConcealedEffect| {
+            effect
+                .parameters()
+                .get("channel")
+                .and_then(|name| name.as_str())
+                .is_some_and(|name| name.starts_with('f'))
+        };
+        let [all, encoders] = [EVERYTHING, Recorded::NoTensions].map(|recorded| hidden(recorded, seed));
+        assert_eq!([all.len(), encoders.len()], [4, 4], "seed {seed}");
+        seen += all.iter().filter(is_of_tension).count();
+        unseen += encoders.iter().filter(is_of_tension).count();
+    }
+    assert!(seen > 20, "{seen}");
+    assert_eq!(unseen, 0);
 }

@@ -4,6 +4,7 @@
 use std::process::ExitCode;
 
 use bowden_tests::other_benches::{Hides, ROUND, drawn, examine, table, write};
+use bowden_tests::prove::recorded::Recorded;
 use bowden_tests::rounds::{Kept, Rounds};
 use clap::Parser;
 
@@ -17,6 +18,9 @@ struct Options {
     /// What nine of twelve benches hide
     #[arg(long, value_enum, default_value_t = Hides::Effect)]
     hide: Hides,
+    /// What was recorded of the motion that is learned from
+    #[arg(long, value_enum, default_value_t = Recorded::Everything)]
+    recorded: Recorded,
     #[command(flatten)]
     rounds: Rounds,
     #[command(flatten)]
@@ -24,12 +28,12 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let Options { hide, rounds, kept } = Options::parse();
+    let Options { hide, recorded, rounds, kept } = Options::parse();
     let one = |number, place| {
-        let case = drawn(hide, number, place)?;
+        let case = drawn(hide, number, place, recorded)?;
         match kept.folder(number) {
-            Some(folder) => write(&case, &folder).map(|()| None),
-            None => examine(case).map(Some),
+            Some(folder) => write(&case, recorded, &folder).map(|()| None),
+            None => examine(case, recorded).map(Some),
         }
     };
     rounds.run(ROUND, one, table)

@@ -1,5 +1,6 @@
 //! What of a bench's motion reaches the training recording: channels that were not recorded, a slow rate, a dirty file.
 
+use clap::ValueEnum;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use virtual_bench::Recording;
@@ -26,7 +27,7 @@ const FROZEN_IN: usize = 8000;
 const FROZEN_ROWS: [f64; 2] = [50.0, 400.0];
 
 /// What was recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Recorded {
     /// Everything, at 1 kHz.
     Everything,
