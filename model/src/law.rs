@@ -9,7 +9,7 @@
 //! | power by direction | `a (1 + s sign(x)) abs(x)^p` |
 //! | sign | `a sign(x)` |
 //! | wave | `a sin(n x + phase)`; over time `a sin(2 pi f t + phase)` |
-//! | bump | `a exp(-((x - at) / width)^2)` |
+//! | bump | `a exp(-abs((x - at) / width)^s)` |
 //! | ramp | `a x` |
 //! | square | `a x^2`, or `a x abs(x)` |
 //! | decay | `a (1 - exp(-t / time_constant))` |
@@ -38,6 +38,10 @@ pub use port::{Port, Variable};
 
 /// Turn of a branch below which a loop along an angle is not told from dry friction \[rad\]: three counts of a 12-bit encoder.
 const NARROWEST_LOOP_RAD: f64 = 5e-3;
+
+/// Distance of an exponent from 1, and of an asymmetry from 0, within which a power is in proportion: what else a model leaves out shifts both by as
+/// much.
+const NEARLY_ONE: f64 = 0.1;
 
 /// Port, variable and form of a law, with its coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +96,24 @@ impl Law {
     fn shifts_the_stick_band(&self) -> bool {
         self.form == Form::Sign && matches!(self.port, Port::MotorFriction | Port::JointFriction)
     }
+
+    /// The effect of the catalogue that this is with an exponent near 1, and the sign of its first parameter in the law's.
+    fn in_proportion(&self, p: &[f64; MAX_PARAMETERS]) -> Option<(&'static str, f64)> {
+        let differs_with_direction = self.form == Form::DirectedPower && p[2].abs() > NEARLY_ONE;
+        if (p[1] - 1.0).abs() > NEARLY_ONE || differs_with_direction {
+            return None;
+        }
+        match (self.form, self.port, self.variable) {
+            (Form::EvenPower | Form::DirectedPower, Port::MotorFriction, Variable::InputSpeed) => {
+                Some(("motor_viscous_friction", 1.0))
+            }
+            (Form::EvenPower | Form::DirectedPower, Port::JointFriction, Variable::JointSpeed) => {
+                Some(("joint_viscous_friction", 1.0))
+            }
+            (Form::Power, Port::JointTorque, Variable::JointAngle) => Some(("joint_spring", -1.0)),
+            _ => None,
+        }
+    }
 }
 
 impl Effect for Law {
@@ -105,10 +127,15 @@ impl Effect for Law {
     }
 
     /// How large a law usually is nobody knows; the loss alone decides. A loop along an angle that is narrower than what dry friction gives
-    /// way by is dry friction, which has a name.
+    /// way by is dry friction, and what is nearly in proportion is viscous friction or a spring, which have names.
     fn is_hardly_there(&self, p: &[f64; MAX_PARAMETERS], _usual: f64) -> bool {
         let turns = matches!(self.variable, Variable::InputAngle | Variable::JointAngle);
-        self.form == Form::Hysteresis && turns && p[1] < NARROWEST_LOOP_RAD
+        (self.form == Form::Hysteresis && turns && p[1] < NARROWEST_LOOP_RAD)
+            || self.in_proportion(p).is_some()
+    }
+
+    fn remainder(&self, p: &[f64; MAX_PARAMETERS]) -> Option<(&'static str, f64)> {
+        self.in_proportion(p).map(|(id, sign)| (id, sign * p[0]))
     }
 
     /// What sets in has partly done so, and a swing has run on.

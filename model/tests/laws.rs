@@ -29,7 +29,10 @@ fn forms_have_the_values_of_their_formulas() {
         (Form::PowerFromOne, &[2.0, 2.0], 0.5, -1.5),
         (Form::Wave, &[2.0, 3.0, 0.5], 0.0, 2.0 * 0.479_425_538_604_203),
         (Form::Oscillation, &[2.0, 0.25, 0.0], 1.0, 2.0),
-        (Form::Bump, &[2.0, 0.3, 0.1], 0.4, 2.0 * 0.367_879_441_171_442),
+        (Form::Bump, &[2.0, 0.3, 0.1, 2.0], 0.4, 2.0 * 0.367_879_441_171_442),
+        // exp(-2^2) and exp(-2^3).
+        (Form::Bump, &[2.0, 0.3, 0.1], 0.1, 2.0 * 0.018_315_638_888_734),
+        (Form::Bump, &[2.0, 0.3, 0.1, 3.0], 0.1, 2.0 * 0.000_335_462_627_903),
         (Form::Ramp, &[2.0], -0.5, -1.0),
         (Form::Square, &[2.0], -0.5, 0.5),
         (Form::SignedSquare, &[2.0], -0.5, -0.5),
@@ -187,4 +190,25 @@ fn a_loop_narrower_than_an_encoder_shows_is_dry_friction() {
     let law = find("law_joint_torque_hysteresis").unwrap();
     let with = |width_rad: f64| law.is_hardly_there(&coefficients(&[0.04, width_rad]), 0.1);
     assert!(with(0.002) && !with(0.02));
+}
+
+/// At 1 rad/s, or 1 rad, the law and the effect of which it has the form are as large.
+#[test]
+fn a_power_that_is_nearly_in_proportion_is_an_effect_of_the_catalogue() {
+    for (id, at, effect) in [
+        ("law_joint_friction_by_speed", 1.07, Some(("joint_viscous_friction", 0.05))),
+        ("law_motor_friction_by_speed", 0.92, Some(("motor_viscous_friction", 0.05))),
+        ("law_joint_torque_by_angle", 1.0, Some(("joint_spring", -0.05))),
+        // Before the gear a spring has no name.
+        ("law_motor_torque_by_angle", 1.0, None),
+        ("law_joint_friction_by_speed", 1.3, None),
+        ("law_joint_friction_by_direction", 1.07, Some(("joint_viscous_friction", 0.05))),
+    ] {
+        let law = find(id).unwrap();
+        let p = coefficients(&[0.05, at, 0.02]);
+        assert_eq!(law.remainder(&p), effect, "{id}");
+        assert_eq!(law.is_hardly_there(&p, 0.0), effect.is_some(), "{id}");
+    }
+    let one_way = coefficients(&[0.05, 1.0, 0.5]);
+    assert!(!find("law_joint_friction_by_direction").unwrap().is_hardly_there(&one_way, 0.0));
 }

@@ -23,7 +23,8 @@ pub enum Form {
     Wave,
     /// `a sin(2 pi f x + phase)`, parameters `a`, `f`, `phase`.
     Oscillation,
-    /// `a exp(-((x - at) / width)^2)`, parameters `a`, `at`, `width`.
+    /// `a exp(-abs((x - at) / width)^s)`, parameters `a`, `at`, `width`, `s`: round with `s = 2`, flat with steep edges with more. A law
+    /// without `s` has 2.
     Bump,
     /// `a x`, parameter `a`.
     Ramp,
@@ -53,7 +54,7 @@ impl Form {
             Self::Oscillation => p[0] * sin(2.0 * PI * p[1] * x + p[2]),
             Self::Bump => {
                 let place = (x - p[1]) / p[2];
-                p[0] * exp(-place * place)
+                p[0] * exp(-pow(place.abs(), if p[3] == 0.0 { 2.0 } else { p[3] }))
             }
             Self::Ramp => p[0] * x,
             Self::Square => p[0] * x * x,

@@ -41,6 +41,8 @@ const FREQUENCY: ParameterSpec = ParameterSpec::log("frequency_hz", "Hz", [0.05,
 const PHASE: ParameterSpec = ParameterSpec::linear("phase_rad", "rad", [-3.15, 3.15], 0.0, "phase at zero");
 const AT: ParameterSpec = ParameterSpec::linear("at_rad", "rad", [-100.0, 100.0], 0.0, "place");
 const WIDTH: ParameterSpec = ParameterSpec::log("width_rad", "rad", [0.005, 20.0], 0.15, "half width");
+const STEEPNESS: ParameterSpec =
+    ParameterSpec::log("steepness", "1", [1.0, 12.0], 2.0, "steepness of its edges");
 const TIME_CONSTANT: ParameterSpec =
     ParameterSpec::log("time_constant_s", "s", [0.5, 1000.0], 10.0, "time constant");
 
@@ -140,16 +142,16 @@ pub static LAWS: [Law; 34] = [
         MotorFriction,
         InputAngle,
         Bump,
-        "amplitude_nm * exp(-((theta_in_rad - at_rad) / width_rad)^2)",
-        [RUB, AT, WIDTH]
+        "amplitude_nm * exp(-abs((theta_in_rad - at_rad) / width_rad)^steepness)",
+        [RUB, AT, WIDTH, STEEPNESS]
     ),
     law!(
         "law_motor_torque_at_a_place",
         MotorTorque,
         InputAngle,
         Bump,
-        "amplitude_nm * exp(-((theta_in_rad - at_rad) / width_rad)^2)",
-        [TORQUE, AT, WIDTH]
+        "amplitude_nm * exp(-abs((theta_in_rad - at_rad) / width_rad)^steepness)",
+        [TORQUE, AT, WIDTH, STEEPNESS]
     ),
     law!(
         "law_motor_torque_by_angle",
@@ -188,8 +190,8 @@ pub static LAWS: [Law; 34] = [
         SheathFriction,
         InputAngle,
         Bump,
-        "amplitude * exp(-((theta_in_rad - at_rad) / width_rad)^2)",
-        [RELATIVE, AT, WIDTH]
+        "amplitude * exp(-abs((theta_in_rad - at_rad) / width_rad)^steepness)",
+        [RELATIVE, AT, WIDTH, STEEPNESS]
     ),
     law!(
         "law_sheath_friction_along_the_angle",
@@ -300,16 +302,16 @@ pub static LAWS: [Law; 34] = [
         JointFriction,
         JointAngle,
         Bump,
-        "amplitude_nm * exp(-((theta_out_rad - at_rad) / width_rad)^2)",
-        [RUB, AT, WIDTH]
+        "amplitude_nm * exp(-abs((theta_out_rad - at_rad) / width_rad)^steepness)",
+        [RUB, AT, WIDTH, STEEPNESS]
     ),
     law!(
         "law_joint_torque_at_a_place",
         JointTorque,
         JointAngle,
         Bump,
-        "amplitude_nm * exp(-((theta_out_rad - at_rad) / width_rad)^2)",
-        [TORQUE, AT, WIDTH]
+        "amplitude_nm * exp(-abs((theta_out_rad - at_rad) / width_rad)^steepness)",
+        [TORQUE, AT, WIDTH, STEEPNESS]
     ),
     law!(
         "law_joint_torque_along_the_angle",

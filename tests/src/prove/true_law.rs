@@ -27,9 +27,14 @@ struct Stated {
     coefficients: Vec<(&'static str, f64)>,
 }
 
-/// Areas under `1/(1+u^6)` and `1/(1+u^4)` over that under `exp(-u^2)`: widths of bumps that rub as much.
-const SIXTH_POWER_WIDTH: f64 = 2.094_395 / 1.772_454;
-const FOURTH_POWER_WIDTH: f64 = 2.221_441 / 1.772_454;
+/// Steepness `s` of the bump `exp(-abs(u / width)^s)`, by quarters, that comes nearest to `1/(1+u^6)` and to `1/(1+u^4)` with as large an area: it
+/// leaves a tenth and a half of the squares that `s = 2` leaves.
+const SIXTH_POWER_STEEPNESS: f64 = 4.0;
+const FOURTH_POWER_STEEPNESS: f64 = 2.5;
+
+/// Areas under both over those under such bumps of width one, `2 Γ(1 + 1/s)`: widths of bumps that rub as much.
+const SIXTH_POWER_WIDTH: f64 = 2.094_395 / 1.812_805;
+const FOURTH_POWER_WIDTH: f64 = 2.221_441 / 1.774_528;
 
 /// First harmonic of a triangle of amplitude one, `8 / π²`.
 const TRIANGLE_HARMONIC: f64 = 0.810_569;
@@ -39,7 +44,7 @@ const RUBBING_RAD: f64 = 0.08;
 const ROUGH_RAD: f64 = 0.1;
 
 fn bump(variable: &str, amplitude: &str) -> String {
-    format!("{amplitude} * exp(-(({variable} - at_rad) / width_rad)^2)")
+    format!("{amplitude} * exp(-abs(({variable} - at_rad) / width_rad)^steepness)")
 }
 
 fn wave(variable: &str, amplitude: &str) -> String {
@@ -63,8 +68,8 @@ fn stated(effect: &ConcealedEffect) -> Option<Stated> {
     let swinging = |amplitude, size: f64, hz: f64| {
         vec![(amplitude, size), ("frequency_hz", hz), ("phase_rad", phase_rad(hz))]
     };
-    let rubbing = |amplitude, size: f64, at: f64, width: f64| {
-        vec![(amplitude, size), ("at_rad", at), ("width_rad", width)]
+    let rubbing = |amplitude, size: f64, at: f64, [width, steepness]: [f64; 2]| {
+        vec![(amplitude, size), ("at_rad", at), ("width_rad", width), ("steepness", steepness)]
     };
     match effect {
         ConcealedEffect::UnlistedJoint(e) => {
@@ -90,8 +95,8 @@ fn stated(effect: &ConcealedEffect) -> Option<Stated> {
                     law("joint", "joint_torque_nm", angle, formula, coefficients)
                 }
                 JointLaw::RubbingRange => {
-                    let width_rad = SIXTH_POWER_WIDTH * RUBBING_RAD;
-                    let coefficients = rubbing("amplitude_nm", size, e.place, width_rad);
+                    let edges = [SIXTH_POWER_WIDTH * RUBBING_RAD, SIXTH_POWER_STEEPNESS];
+                    let coefficients = rubbing("amplitude_nm", size, e.place, edges);
                     law("joint", "joint_friction_nm", angle, bump(angle, "amplitude_nm"), coefficients)
                 }
                 JointLaw::TriangleRipple => {
@@ -117,8 +122,8 @@ fn stated(effect: &ConcealedEffect) -> Option<Stated> {
                     law("motor", "motor_friction_nm", speed, formula, coefficients)
                 }
                 MotorLaw::DamagedSector => {
-                    let width_rad = SIXTH_POWER_WIDTH * RUBBING_RAD;
-                    let coefficients = rubbing("amplitude_nm", size, e.place, width_rad);
+                    let edges = [SIXTH_POWER_WIDTH * RUBBING_RAD, SIXTH_POWER_STEEPNESS];
+                    let coefficients = rubbing("amplitude_nm", size, e.place, edges);
                     law("motor", "motor_friction_nm", angle, bump(angle, "amplitude_nm"), coefficients)
                 }
                 MotorLaw::Shaker => {
@@ -137,7 +142,8 @@ fn stated(effect: &ConcealedEffect) -> Option<Stated> {
                 TransmissionLaw::OutputLobes => lobes("output_radius", "theta_out_rad"),
                 TransmissionLaw::InputLobes => lobes("input_radius", "theta_in_rad"),
                 TransmissionLaw::RoughRange => {
-                    let coefficients = rubbing("amplitude", e.size, e.place, FOURTH_POWER_WIDTH * ROUGH_RAD);
+                    let edges = [FOURTH_POWER_WIDTH * ROUGH_RAD, FOURTH_POWER_STEEPNESS];
+                    let coefficients = rubbing("amplitude", e.size, e.place, edges);
                     let angle = "theta_in_rad";
                     law("transmission", "sheath_friction", angle, bump(angle, "amplitude"), coefficients)
                 }

@@ -45,8 +45,7 @@ fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
         return Err(section.source.at(&port_span, format!("unknown port `{port}`; {}", advice(port, known))));
     }
     let (formula, span) = section.text("formula", "what it adds there")?;
-    let squeezed = |formula: &str| formula.split_whitespace().collect::<String>();
-    let law = at_port().find(|law| squeezed(law.formula()) == squeezed(formula)).ok_or_else(|| {
+    let law = at_port().find(|law| is_of(law, formula)).ok_or_else(|| {
         let known: Vec<String> = at_port().map(|law| format!("`{}`", law.formula())).collect();
         let reason = format!("no formula `{formula}` at port {port}; expected one of {}", known.join(", "));
         section.source.at(&span, reason)
@@ -73,12 +72,23 @@ fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
     let mut parameters = descriptor.defaults();
     for (value, spec) in parameters.iter_mut().zip(descriptor.parameters) {
         let bounds = Bounds { lower: spec.lower, upper: spec.upper, unit: spec.unit };
-        *value = coefficients
-            .number(spec.name, bounds)?
+        let stated = coefficients.number(spec.name, bounds)?;
+        // A number in the formula in its place.
+        let is_in_formula = !formula.contains(spec.name);
+        *value = stated
+            .or(is_in_formula.then_some(spec.default))
             .ok_or_else(|| coefficients.lacks(spec.name, &format!("{}, {}", spec.meaning, spec.unit)))?;
     }
     check_units(section, law)?;
     Ok(ActiveEffect { effect: law, parameters, target: target(section, law)?, bench: None })
+}
+
+/// Whether a formula is that of `law`. Spaces do not count, and a bump may be written as files of before its edges had a steepness have it.
+fn is_of(law: &Law, formula: &str) -> bool {
+    let squeezed = |formula: &str| formula.split_whitespace().collect::<String>();
+    let own = squeezed(law.formula());
+    let round = own.replace("-abs((", "-((").replace("^steepness", "^2");
+    [own, round].contains(&squeezed(formula))
 }
 
 /// Units may be left out, but not be others than the formula's.
@@ -128,7 +138,7 @@ pub(super) fn insert(document: &mut DocumentMut, law: &Law, active: &ActiveEffec
     let is_same = |table: &Table| {
         let text = |key: &str| table.get(key).and_then(Item::as_str);
         text("port") == Some(law.port().name())
-            && text("formula") == Some(law.formula())
+            && text("formula").is_some_and(|formula| is_of(law, formula))
             && text("channel") == channel
     };
     let there = list.iter().position(is_same);

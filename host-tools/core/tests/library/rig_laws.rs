@@ -55,6 +55,29 @@ fn every_law_reads_back_as_it_was_written() {
     }
 }
 
+/// Files of before a bump's edges had a steepness state 2 in its formula; fitted again, they state the coefficient.
+#[test]
+fn a_round_bump_may_state_its_steepness_in_the_formula() {
+    let law = r#"
+[[law]]
+component = "joint"
+port = "joint_friction_nm"
+variables = ["theta_out_rad"]
+formula = "amplitude_nm * exp(-((theta_out_rad - at_rad) / width_rad)^2)"
+coefficients = { amplitude_nm = 0.1, at_rad = 0.3, width_rad = 0.2 }
+"#;
+    let mut document = RigDocument::parse(&format!("{RIG}{law}"), "rig.toml").unwrap();
+    let [mut bump] = document.rig().unwrap().effects[..] else { panic!("{document}") };
+    assert_eq!(bump.descriptor().id, "law_joint_friction_at_a_place");
+    assert_eq!(bump.parameters[..4], [0.1, 0.3, 0.2, 2.0]);
+    bump.parameters[3] = 4.0;
+    document.add_effect(&bump).unwrap();
+    assert_eq!(document.rig().unwrap().effects, [bump], "{document}");
+    let unstated = law.replace("-((", "-abs((").replace("^2", "^steepness");
+    let error = Rig::parse(&format!("{RIG}{unstated}"), "rig.toml").unwrap_err();
+    assert!(error.message().contains("[law.coefficients] lacks `steepness`"), "{}", error.message());
+}
+
 #[test]
 fn one_law_may_act_on_two_sensors() {
     let law = LAWS.iter().find(|law| law.descriptor().id == "law_reading_sets_in").unwrap();

@@ -1,13 +1,14 @@
 //! Comparison of the named effects with the laws of their component, because a named effect may be only the nearest entry of the catalogue:
 //! a gain and an offset imitate a curved sensor, viscous friction imitates drag.
 //!
-//! A law is fitted in place of one named effect, or of several of one component, together with all other effects. The more likely of the two
-//! is kept, with the prior odds that [`handicap`] gives to effects of the catalogue; the other one counts as its rival.
+//! A law is fitted in place of one named effect, or of all that was found of one component, laws among it, together with all other effects:
+//! a spring and a ripple imitate a torque that rises with the cube of the angle. The more likely of the two is kept, with the prior odds that
+//! [`handicap`] gives to effects of the catalogue; the other one counts as its rival.
 
 use bowden_model::effect::{ActiveEffect, Component};
 use bowden_model::law;
 
-use super::laws::RIVALLING;
+use super::laws::rivalling;
 use super::loudest::without_the_loudest;
 use super::{
     Chosen, Explanation, Fitted, PROMISING, Round, Search, Tried, handicap, instances, is_further, remove,
@@ -62,11 +63,14 @@ impl Search<'_> {
         };
         let before = self.without_exhausted(&rest)?;
         let bench = chosen[places[0]].effect.bench;
+        let with_laws = places.iter().any(|place| law::of(&chosen[*place].effect).is_some());
         let removed_share = 1.0 - present.loss_on(bench) / before.loss_on(bench);
         let predictions = self.objective.predict(&before.solution.model)?;
         let mut all = law_candidates(bench, &before.without_ordinary(), self.objective, &predictions);
         all.retain(|candidate| places.iter().all(|place| can_replace(candidate, &chosen[*place].effect)));
-        let promising = (RIVALLING * removed_share).max(PROMISING);
+        // That a law had to be added tells that straight lines promised too little of what it would do by itself.
+        let promising =
+            if with_laws { PROMISING } else { rivalling(rounds, &chosen[places[0]].effect, removed_share) };
         let (record, fits) = self.best_of(&before, &predictions, &all, promising, Some(present.loss))?;
         rounds.push(Round { loss_before: before.loss, candidates: record });
         let Some(best) = fits.into_iter().find(|fitted| fitted.finished) else { return Ok(false) };
@@ -77,8 +81,11 @@ impl Search<'_> {
         let [named_loss, stated_loss] = [&*present, &law].map(|fitted| fitted.loss_on(bench));
         let is_likelier_overall = is_likelier(named_loss, stated_loss);
         let quieter = without_the_loudest(&present.stretch_losses_on(bench), &law.stretch_losses_on(bench));
+        let does_better = |[named, stated]: &[f64; 2]| {
+            if with_laws { is_likelier(*named, *stated) } else { stated < named }
+        };
         if is_likelier_overall
-            && quieter.iter().all(|[named, stated]| stated < named)
+            && quieter.iter().all(does_better)
             && self.is_no_parameter(&before, &law, law.newest_place())?
             && self.holds_across_recordings(present, &law, is_likelier)?
         {
@@ -97,32 +104,38 @@ impl Search<'_> {
     }
 }
 
-/// Groups of named effects, each with its instances, that one law may have been taken for: first all of a component, or of one sensor, then
-/// each by itself.
+/// Groups of what was found, each with its instances, that one law may have been taken for: all of a component, or of one sensor, that has a
+/// name and a law; the names of each; and each name by itself.
 fn imitators(chosen: &[Chosen]) -> Vec<Vec<ActiveEffect>> {
     let is_name = |place: &usize| law::of(&chosen[*place].effect).is_none();
-    let named: Vec<usize> =
-        (0..chosen.len()).filter(|place| is_name(place) && !is_further(chosen, *place)).collect();
-    let with_instances = |group: &[usize]| -> Vec<ActiveEffect> {
-        group.iter().flat_map(|place| instances(chosen, *place)).map(|place| chosen[place].effect).collect()
-    };
+    let found: Vec<usize> = (0..chosen.len()).filter(|place| !is_further(chosen, *place)).collect();
+    let names: Vec<usize> = found.iter().copied().filter(is_name).collect();
     let are_of_one_part = |one: &ActiveEffect, other: &ActiveEffect| {
         let component = one.descriptor().component;
         component == other.descriptor().component
             && one.bench == other.bench
             && (component != Component::Sensors || are_of_one_sensor(one, other))
     };
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for place in &named {
-        let effect = &chosen[*place].effect;
-        match groups.iter_mut().find(|group| are_of_one_part(&chosen[group[0]].effect, effect)) {
-            Some(group) => group.push(*place),
-            None => groups.push(vec![*place]),
+    let by_part = |places: &[usize]| {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for place in places {
+            let effect = &chosen[*place].effect;
+            match groups.iter_mut().find(|group| are_of_one_part(&chosen[group[0]].effect, effect)) {
+                Some(group) => group.push(*place),
+                None => groups.push(vec![*place]),
+            }
         }
-    }
-    groups.retain(|group| group.len() > 1);
-    groups.extend(named.into_iter().map(|place| vec![place]));
-    groups.iter().map(|group| with_instances(group)).collect()
+        groups.retain(|group| group.len() > 1);
+        groups
+    };
+    let mut groups = by_part(&found);
+    groups.retain(|group| group.iter().any(is_name) && !group.iter().all(is_name));
+    groups.extend(by_part(&names));
+    groups.extend(names.into_iter().map(|place| vec![place]));
+    let with_instances = |group: &Vec<usize>| {
+        group.iter().flat_map(|place| instances(chosen, *place)).map(|place| chosen[place].effect).collect()
+    };
+    groups.iter().map(with_instances).collect()
 }
 
 /// Whether a law acts where `named` does.
@@ -224,6 +237,18 @@ mod tests {
         assert!((curvature / 0.01 - 1.0).abs() < 0.05, "{curvature}");
     }
 
+    /// A spring and a ripple along the angle, which imitate what grows with its cube.
+    #[test]
+    fn a_name_and_the_law_beside_it_give_way_to_the_law_that_they_imitate() {
+        let cube = stated("law_joint_torque_by_angle").with("amplitude_nm", -3.0).with("exponent", 3.0);
+        let ripple = stated("law_joint_torque_along_the_angle").with("amplitude_nm", 0.1);
+        let left = compared(&[cube], &[named("joint_spring"), ripple]);
+        let [law] = &left[..] else { panic!("{:?}", left.iter().map(|one| one.effect).collect::<Vec<_>>()) };
+        assert_eq!(law.effect.descriptor().id, "law_joint_torque_by_angle");
+        let [amplitude_nm, exponent, ..] = law.effect.parameters;
+        assert!((amplitude_nm / -3.0 - 1.0).abs() < 0.05 && (exponent - 3.0).abs() < 0.1, "{:?}", law.effect);
+    }
+
     /// A fit without any effect, in place of one without the replaced effects, would leave the spring to the law.
     #[test]
     fn a_spring_beside_a_curved_sensor_stays() {
@@ -312,6 +337,8 @@ mod tests {
             .map(|effect| chosen(effect, &model))
             .to_vec();
         let expected = [
+            // One law may have been taken for these and the law beside them.
+            vec![dry, law, spring],
             vec![gain, offset],
             vec![dry, spring],
             vec![gain],
