@@ -62,7 +62,7 @@ pub struct Motion {
     /// Largest reference angle \[rad\].
     pub amplitude_rad: f64,
     /// Age of the bench's effects when the recording begins \[s\]: a heldout recording made after a training recording
-    /// of 40 s has 40, and what had happened by then (lost pretension, changed payload, drift, creep) stays so.
+    /// of 40 s has 40, and what had happened by then (lost pretension, changed payload, drift, creep, sensors that warm up) stays so.
     pub clock_start_s: f64,
 }
 

@@ -60,7 +60,7 @@ fn run(
     let effects = ActiveEffects::new(effects)?;
     let steps = config.steps_per_sample();
     let mut plant = Plant::new(config, effects.clone(), clock_start_s);
-    let mut sensors = Sensors::new(config, effects, seed);
+    let mut sensors = Sensors::new(config, effects, clock_start_s, seed);
     let mut controller = Controller::new(config);
     let (Drive::Reference(values) | Drive::Duty(values)) = drive;
     let mut recording = Recording::with_capacity(values.len());

@@ -39,7 +39,8 @@ pub(crate) struct Sensors {
 }
 
 impl Sensors {
-    pub(crate) fn new(config: &BenchConfig, effects: ActiveEffects, seed: u64) -> Self {
+    /// Sensors that have been on for `clock_start_s` \[s\].
+    pub(crate) fn new(config: &BenchConfig, effects: ActiveEffects, clock_start_s: f64, seed: u64) -> Self {
         let period_s = 1.0 / config.sample_rate_hz;
         let lag = effects.sensor_lag.as_ref().map(|law| Lag {
             channel: law.channel as usize,
@@ -56,7 +57,7 @@ impl Sensors {
             lag,
             noise: Draw::new(seed, "sensor noise"),
             period_s,
-            samples: 0,
+            samples: (clock_start_s / period_s).round() as u64,
             rad_per_count: TAU / f64::from(1_u32 << config.encoder_bits),
             newton_per_lsb: config.tension_full_scale_n / f64::from(1_u32 << config.adc_bits),
             full_scale_n: config.tension_full_scale_n,
