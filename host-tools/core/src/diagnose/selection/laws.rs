@@ -145,6 +145,7 @@ impl Search<'_> {
             if !self.add_best(&before, tried, now, rounds, worth)? {
                 break;
             }
+            self.choose_kind(now)?;
             self.prune(now)?;
             // Beside the law an effect may show that is worth little without it.
             self.add_names(now, rounds, Policy::worth_naming_in_doubt)?;
