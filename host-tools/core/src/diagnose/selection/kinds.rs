@@ -3,7 +3,7 @@
 //!
 //! The other kind is tried as soon as the effect is found, because what the wrong one leaves has the form of yet another effect: at the rests
 //! of a staircase that of a weight that was changed. While much else is missing the recordings may not tell the kinds apart: once all effects
-//! are known the other kinds are tried again.
+//! are known the other kinds are tried again. A law that is confined to a place may have been found at one edge of it: it is moved.
 
 use bowden_model::effect::ActiveEffect;
 use bowden_model::law::{self, Form};
