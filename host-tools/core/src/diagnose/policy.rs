@@ -75,7 +75,7 @@ impl Policy {
     }
 
     /// The same where the reduction may have another cause: for an error of a sensor that its own channel cannot distinguish from a change
-    /// of parameters, and for an effect beside a law whose form may be right only roughly. It must reach the share of a law.
+    /// of parameters. It must reach the share of a law.
     #[must_use]
     pub fn worth_naming_in_doubt(&self, before: f64, after: f64) -> bool {
         self.worth_naming(before, after) && before - after > self.law_share * before
@@ -110,7 +110,8 @@ impl Policy {
             && before - after > self.share_per_parameter * instances as f64 * before
     }
 
-    /// Whether a law that reduces the loss from `before` to `after` is stated.
+    /// Whether a law that reduces the loss from `before` to `after` is stated, or an effect named that shows beside a law alone, whose form may
+    /// be right only roughly.
     #[must_use]
     pub fn worth_stating(&self, before: f64, after: f64) -> bool {
         before - after > self.law_loss && before - after > self.law_share * before
