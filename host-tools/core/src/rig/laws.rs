@@ -14,7 +14,7 @@
 //! [`bowden_model::law::LAWS`]; another one is refused with those of its port.
 
 use bowden_model::channel::Channel;
-use bowden_model::effect::{ActiveEffect, Effect, Target};
+use bowden_model::effect::{ActiveEffect, Effect, ParameterSpec, Target};
 use bowden_model::law::{LAWS, Law};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
@@ -68,15 +68,16 @@ fn read_law(section: &Section) -> Result<ActiveEffect, Failure> {
     let coefficients = section
         .section("coefficients", "law.coefficients")?
         .ok_or_else(|| section.lacks("coefficients", "values of the formula"))?;
-    coefficients.refuse_unknown("coefficient", descriptor.parameters.iter().map(|spec| spec.name))?;
+    // What has a number in the formula has no coefficient.
+    let is_asked = |spec: &&ParameterSpec| formula.contains(spec.name);
+    let asked = descriptor.parameters.iter().filter(is_asked).map(|spec| spec.name);
+    coefficients.refuse_unknown("coefficient", asked)?;
     let mut parameters = descriptor.defaults();
     for (value, spec) in parameters.iter_mut().zip(descriptor.parameters) {
         let bounds = Bounds { lower: spec.lower, upper: spec.upper, unit: spec.unit };
-        let stated = coefficients.number(spec.name, bounds)?;
-        // A number in the formula in its place.
-        let is_in_formula = !formula.contains(spec.name);
+        let stated =
+            if is_asked(&spec) { coefficients.number(spec.name, bounds)? } else { Some(spec.default) };
         *value = stated
-            .or(is_in_formula.then_some(spec.default))
             .ok_or_else(|| coefficients.lacks(spec.name, &format!("{}, {}", spec.meaning, spec.unit)))?;
     }
     check_units(section, law)?;

@@ -73,6 +73,9 @@ coefficients = { amplitude_nm = 0.1, at_rad = 0.3, width_rad = 0.2 }
     bump.parameters[3] = 4.0;
     document.add_effect(&bump).unwrap();
     assert_eq!(document.rig().unwrap().effects, [bump], "{document}");
+    let twice = law.replace("0.2 }", "0.2, steepness = 4 }");
+    let error = Rig::parse(&format!("{RIG}{twice}"), "rig.toml").unwrap_err();
+    assert!(error.message().contains("unknown coefficient `steepness`"), "{}", error.message());
     let unstated = law.replace("-((", "-abs((").replace("^2", "^steepness");
     let error = Rig::parse(&format!("{RIG}{unstated}"), "rig.toml").unwrap_err();
     assert!(error.message().contains("[law.coefficients] lacks `steepness`"), "{}", error.message());

@@ -41,6 +41,7 @@ impl Search<'_> {
     ) -> Result<(), Failure> {
         self.laws_in_place_on_benches(now, rounds)?;
         if self.law_in_place_of_names(nothing, now, rounds)? {
+            self.choose_kind(now)?;
             self.add_names(now, rounds, Policy::worth_naming)?;
         }
         self.add_laws(now, rounds)
