@@ -17,6 +17,7 @@ mod loudest;
 mod names;
 mod one_bench;
 mod own_channel;
+mod places;
 mod repeating;
 mod rival_laws;
 mod trying;

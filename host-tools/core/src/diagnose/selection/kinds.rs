@@ -3,20 +3,11 @@
 //!
 //! The other kind is tried as soon as the effect is found, because what the wrong one leaves has the form of yet another effect: at the rests
 //! of a staircase that of a weight that was changed. While much else is missing the recordings may not tell the kinds apart: once all effects
-//! are known the other kinds are tried again. A law that is confined to a place may have been found at one edge of it: it is moved.
-
-use bowden_model::effect::ActiveEffect;
-use bowden_model::law::{self, Form};
+//! are known the other kinds are tried again.
 
 use super::{Explanation, PATIENCE, Search, handicap};
 use crate::fit::solver::{FINE_STEP, Known, solve_for_ranking};
 use crate::outcome::Failure;
-
-/// Steepness of a range with edges.
-const RANGE: f64 = 4.0;
-
-/// Times that a bump may move.
-const MOVES: usize = 3;
 
 impl Search<'_> {
     /// Replaces the kind of the effect that was found last by the likeliest one.
@@ -30,34 +21,25 @@ impl Search<'_> {
     }
 
     fn choose_kind_of(&self, index: usize, now: &mut Explanation) -> Result<(), Failure> {
-        // A bump may have to move several times.
-        for _ in 0..MOVES {
-            if !self.takes_likelier(index, now)? || !is_bump(&now.chosen[index].effect) {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether another kind was likelier.
-    fn takes_likelier(&self, index: usize, now: &mut Explanation) -> Result<bool, Failure> {
-        let mut taken = false;
         let Explanation { fit: present, chosen } = now;
         let place = present.layout.first_found() + index;
         let found = present.solution.model.effects[place];
-        for other in others(&found) {
+        let Some(spec) = found.descriptor().parameters.iter().find(|spec| spec.is_choice) else {
+            return Ok(());
+        };
+        let others = spec.forms.iter().map(|form| found.with(spec.name, *form));
+        for other in others.filter(|other| other.parameters != found.parameters) {
             if self.progress.interrupted() {
-                break;
+                return Ok(());
             }
             let mut model = present.solution.model.clone();
             model.effects[place] = other;
             let likelier = |loss: f64, others_loss: f64| {
                 handicap(&other) * others_loss < handicap(&present.solution.model.effects[place]) * loss
             };
-            // With the slopes of the other kind, in a third of the simulations; at another place they are others.
+            // With the slopes of the other kind, in a third of the simulations.
             let slopes = present.solution.slopes();
-            let jacobian = (!is_bump(&found)).then_some(&slopes.jacobian);
-            let known = Known { jacobian, spread: slopes.spread };
+            let known = Known { jacobian: Some(&slopes.jacobian), spread: slopes.spread };
             let free = present.layout.free(self.believed, &model);
             let ranked = solve_for_ranking(self.objective, &model, &free, PATIENCE, &known)?;
             let ranked = self.judged(present.layout.clone(), ranked, false);
@@ -70,37 +52,16 @@ impl Search<'_> {
             {
                 chosen[index].takes_kind(&with, place);
                 *present = with;
-                taken = true;
             }
         }
-        Ok(taken)
+        Ok(())
     }
-}
-
-fn is_bump(effect: &ActiveEffect) -> bool {
-    law::of(effect).is_some_and(|law| law.form() == Form::Bump)
-}
-
-/// What the recordings may show in the place of `found`: the other kinds of an effect that has several; of a bump, which is started where most is
-/// left and may have come to cover one edge of a range alone, half as wide a range again that goes on to either side.
-fn others(found: &ActiveEffect) -> Vec<ActiveEffect> {
-    if is_bump(found) {
-        let [_, at_rad, width_rad, ..] = found.parameters;
-        let range = found.with("width_rad", 1.5 * width_rad).with("steepness", RANGE);
-        return [-0.5, 0.5].map(|widths| range.with("at_rad", at_rad + widths * width_rad)).to_vec();
-    }
-    let Some(spec) = found.descriptor().parameters.iter().find(|spec| spec.is_choice) else {
-        return Vec::new();
-    };
-    let others = spec.forms.iter().map(|form| found.with(spec.name, *form));
-    others.filter(|other| other.parameters != found.parameters).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use bowden_model::effect::ActiveEffect;
     use bowden_model::effects::find;
-    use bowden_model::law;
 
     use super::super::{Asked, Chosen, Explanation, Policy, Search};
     use crate::diagnose::layout::Layout;
@@ -143,33 +104,6 @@ mod tests {
         assert_eq!((rubbing.effect.parameters[2], springy.effect.descriptor().id), (1.0, "joint_spring"));
         assert_eq!(now.fit.solution.model.effects[now.fit.layout.first_found()], rubbing.effect);
         assert!(now.fit.loss < 0.5 * loss_before, "{loss_before} to {}", now.fit.loss);
-    }
-
-    /// A joint that rubs from -0.1 to 0.3 rad, found as a round bump on the lower edge: the fit from there ends elsewhere.
-    #[test]
-    fn a_bump_that_covers_one_edge_of_a_range_goes_on_to_the_other() {
-        let recording = test_bench::swung(6000);
-        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
-        let bump = |at_rad: f64, width_rad: f64, steepness: f64| {
-            let law = ActiveEffect::with_defaults(law::find("law_joint_friction_at_a_place").unwrap());
-            let sized = law.with("amplitude_nm", 0.3).with("at_rad", at_rad);
-            sized.with("width_rad", width_rad).with("steepness", steepness)
-        };
-        let recording = test_bench::measured(&model, recording, &[bump(0.1, 0.2, 6.0)]);
-        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
-        let asked = Asked::default();
-        let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
-        let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP]).unwrap();
-        let (layout, with) = nothing.layout.with(&model, bump(-0.1, 0.03, 2.0));
-        let fit = search.fit(layout, &with, &[COARSE_STEP]).unwrap();
-        let found_loss = fit.loss;
-        let chosen = vec![Chosen::newest_of(&fit, &nothing, Vec::new())];
-        let mut now = Explanation { fit, chosen };
-        search.choose_kind(&mut now).unwrap();
-        let [one] = &now.chosen[..] else { panic!("{}", now.chosen.len()) };
-        let [_, at_rad, width_rad, ..] = one.effect.parameters;
-        assert!((at_rad - 0.1).abs() < 0.02 && (width_rad - 0.2).abs() < 0.02, "{:?}", one.effect);
-        assert!(now.fit.loss < 0.2 * found_loss, "{found_loss} to {}", now.fit.loss);
     }
 
     /// Found as a spring up to its level, it becomes what it is, with the turn over which it builds up; and a spring stays one.

@@ -41,7 +41,6 @@ impl Search<'_> {
     ) -> Result<(), Failure> {
         self.laws_in_place_on_benches(now, rounds)?;
         if self.law_in_place_of_names(nothing, now, rounds)? {
-            self.choose_kind(now)?;
             self.add_names(now, rounds, Policy::worth_naming)?;
         }
         self.add_laws(now, rounds)
@@ -146,7 +145,6 @@ impl Search<'_> {
             if !self.add_best(&before, tried, now, rounds, worth)? {
                 break;
             }
-            self.choose_kind(now)?;
             self.prune(now)?;
             // Beside the law an effect may show that is worth little without it; so may what its form misses, an eccentric encoder of 10 mrad for a
             // range that rubs with other edges, and it has to reach what a law must.

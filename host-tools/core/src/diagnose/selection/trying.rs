@@ -134,9 +134,10 @@ impl Search<'_> {
         Ok((record, fits.into_iter().map(|(_, fitted)| fitted).collect()))
     }
 
-    /// Fits a coarsely fitted candidate to convergence.
+    /// Fits a coarsely fitted candidate to convergence, wherever that moves it.
     pub(super) fn finish(&self, fitted: &Fitted) -> Result<Fitted, Failure> {
         let finished = self.fit(fitted.layout.clone(), &fitted.solution.model, &[FINE_STEP, FINE_STEP])?;
+        let finished = self.moved(finished)?;
         let model = &finished.solution.model;
         let unseen = between_recordings(self.objective, model, model.effects.len() - 1)?;
         Ok(Fitted { unseen, ..finished })
