@@ -25,8 +25,8 @@ pub struct ReplayInput {
     pub(super) torque_out_nm: Option<Arc<Vec<f64>>>,
     pub(super) start_rad: Option<f64>,
     pub(super) start_rad_s: f64,
-    /// Clock of the bench over that of the recording: the bench's begins at the first sample, wherever the recording's does.
-    clock_offset_s: f64,
+    /// Clock of the bench at the first sample, whatever the recording's shows there.
+    clock_begins_s: f64,
     pub(super) hold: Hold,
     /// Torque by the duty, root mean square, of a joint without tendons that its angle guides, N·m.
     driven_nm: Option<f64>,
@@ -100,7 +100,7 @@ impl ReplayInput {
             torque_out_nm: take(Channel::TorqueOut)?,
             start_rad,
             start_rad_s,
-            clock_offset_s: -t_s.first().copied().unwrap_or(0.0),
+            clock_begins_s: 0.0,
             hold: Hold::of(model),
             driven_nm: model.guided_by.map(|_| model.driven_nm(recording)),
             step_s,
@@ -143,7 +143,7 @@ impl ReplayInput {
             torque_out_nm: some(&self.torque_out_nm),
             start_rad: self.start_rad,
             start_rad_s: self.start_rad_s,
-            clock_offset_s: self.clock_offset_s,
+            clock_begins_s: self.clock_begins_s,
             hold: self.hold,
             driven_nm: self.driven_nm,
             ends_of_scale: Arc::clone(&self.ends_of_scale),
@@ -152,19 +152,19 @@ impl ReplayInput {
 
     /// States how long the bench had run before the first sample, s: what happened to it then has happened already.
     pub fn continues_after(&mut self, clock_s: f64) {
-        self.clock_offset_s = clock_s - self.t_s.first().copied().unwrap_or(0.0);
+        self.clock_begins_s = clock_s;
     }
 
     /// Clock of the bench at the first and at the last sample, s.
     #[must_use]
     pub fn clock_s(&self) -> [f64; 2] {
-        [self.t_s.first(), self.t_s.last()].map(|t_s| self.clock_offset_s + t_s.copied().unwrap_or(0.0))
+        [0, self.t_s.len().saturating_sub(1)].map(|k| self.clock_at_s(k))
     }
 
     /// Clock of the bench at sample `k`, s.
     #[must_use]
     pub fn clock_at_s(&self, k: usize) -> f64 {
-        self.clock_offset_s + self.t_s[k]
+        self.clock_begins_s + (self.t_s[k] - self.t_s[0])
     }
 
     /// Sampling instants, s.
