@@ -42,7 +42,9 @@ def test_the_example_of_the_page_finds_the_lip(lip, bowden_command, monkeypatch)
     assert tried.heldout_loss < 0.5 * tried.heldout_loss_without
     # No listed effect is there: the best of them takes nothing off.
     assert tried.catalogue.heldout_loss > 0.9 * tried.heldout_loss_without
-    assert tried.closed_form.heldout_loss > 1.2 * tried.heldout_loss and tried.free_curve.heldout_loss > tried.heldout_loss
+    # A bump whose edges are as steep comes near to the lip, a round one, at more than twice, does not.
+    assert 1.2 * tried.heldout_loss < tried.closed_form.heldout_loss < 2.0 * tried.heldout_loss
+    assert tried.free_curve.heldout_loss > tried.heldout_loss
     assert d.verdict == "unexplained" and d.unexplained.modelled and "rubbing_lip(theta_out_rad" in d.laws[0].formula
     assert d.to_dict()["hypotheses"][0]["name"] == "rubbing_lip" and "rubbing_lip" in d._native.report_html()
     # The rig needs the function no more: the command simulates its points, and predicts as Python does.
