@@ -1,10 +1,12 @@
 //! Benches of other sizes and proportions than the nominal one.
 
-use bowden_tests::other_benches::{Hides, drawn, examine};
+use bowden_tests::other_benches::{Examined, Hides, drawn, examine};
 use bowden_tests::prove::recorded::Recorded;
 use virtual_bench::ConcealedEffect;
 
 const EVERYTHING: Recorded = Recorded::Everything;
+
+const COEFFICIENT: &str = "sheath.friction_coefficient";
 
 /// Their sheaths are bent elsewhere than those of the nominal bench. Taken to be bent evenly from pulley to pulley, they had tendons that stiffen
 /// beside what they hide.
@@ -52,6 +54,33 @@ fn friction_that_drifts_ever_more_slowly_is_foretold() {
     assert!((left - 0.375).abs() < 0.05, "{left} of the friction is left");
     let loss = &examined.diagnosis.heldout_loss;
     assert!(loss.recalibrated > 30.0 && loss.after < 1.0, "{loss:?}");
+}
+
+/// Without tensions the friction coefficient of the sheath takes up dry friction of the joint, 1.4 times what it is, and leaves a third more than
+/// the friction itself; of the motor's it cannot be told from, and both are said.
+#[test]
+fn dry_friction_is_not_lost_in_the_sheath_where_no_tension_is_recorded() {
+    let examined = |number, place| {
+        let case = drawn(Hides::Effect, number, place, Recorded::NoTensions).unwrap();
+        examine(case, Recorded::NoTensions).unwrap()
+    };
+    let of_coefficient = |examined: &Examined| {
+        let all = &examined.diagnosis.recalibrated;
+        all.iter().find(|one| one.parameter == COEFFICIENT).map(|one| one.fitted / one.nominal).unwrap()
+    };
+    let of_joint = examined(7005, 5);
+    assert_eq!(of_joint.hidden(), ["joint_coulomb_friction"]);
+    assert!(of_joint.is_right(), "{}", of_joint.said());
+    let ratio = of_coefficient(&of_joint);
+    assert!((0.9..1.1).contains(&ratio), "{ratio}");
+
+    let of_motor = examined(6803, 3);
+    assert_eq!((of_motor.hidden(), of_motor.diagnosis.effects.len()), (vec!["motor_coulomb_friction"], 0));
+    let ratio = of_coefficient(&of_motor);
+    assert!(ratio > 1.3, "{ratio}");
+    let group = [COEFFICIENT, "effects.motor_coulomb_friction"].map(str::to_owned).to_vec();
+    let indistinguishable = &of_motor.diagnosis.indistinguishable;
+    assert!(indistinguishable.contains(&group), "{indistinguishable:?}");
 }
 
 /// Of an encoder-and-motor recording nobody can tell what is wrong with a tension channel, so that it is not hidden there; four effects are four.

@@ -30,13 +30,13 @@ mod screening;
 mod selection;
 mod stages;
 mod stated_laws;
+mod taken_up;
 mod unexplained;
 pub mod verdict;
 pub(crate) mod words;
 
 use std::collections::BTreeMap;
 
-use bowden_model::channel::Channel;
 use bowden_model::effect::ActiveEffect;
 use bowden_model::effect_set::MAX_ACTIVE;
 use bowden_model::law;
@@ -61,7 +61,7 @@ pub use hypotheses::Asked;
 use layout::Layout;
 use own_parameters::differing;
 use policy::POLICY;
-use selection::{Attempted, Chosen, Round, Selected, Tried, compare_with_laws, select};
+use selection::{Attempted, Chosen, Held, Round, Selected, Tried, compare_with_laws, select};
 use stages::{Stage, Stages};
 use verdict::{
     Attempt, ChannelFit, Diagnosis, Estimate, Findings, Fit, NamedEffect, OrdinaryEffect, Recalibrated,
@@ -235,7 +235,9 @@ impl Case<'_> {
         let mut selected = select(objective, &coarse, asked, progress)?;
         let before = Stage::of(judge, model)?;
         progress.stage("refining", 0);
-        let rounds: &[f64] = if selected.complete && !self.tensions_unseen() { &[FINE_STEP] } else { &[] };
+        // Without tensions little more than the product of friction and pretension is seen. Fitted without what is ordinary, the two run off
+        // against each other to make up for it, and the tensions with them: the values that were found beside it are kept.
+        let rounds: &[f64] = if selected.complete && !model.tensions_unseen() { &[FINE_STEP] } else { &[] };
         let refined = |selected: &Selected| {
             refine(objective, model, &at_full_resolution(&selected.simulated(), model), rounds)
         };
@@ -391,8 +393,14 @@ fn refine(
 }
 
 impl Case<'_> {
-    /// Bench `index` after its recordings; its diagnosed joint is a variation of `diagnosed`.
-    fn now(&self, index: usize, diagnosed: &JointModel, recalibrated: &[Recalibrated]) -> BenchNow {
+    /// Bench `index` after its recordings; its diagnosed joint is a variation of `diagnosed`, the outcome of `selected`.
+    fn now(
+        &self,
+        index: usize,
+        selected: &Selected,
+        diagnosed: &JointModel,
+        recalibrated: &[Recalibrated],
+    ) -> Result<BenchNow, Failure> {
         let (bench, variation) = &self.benches[index];
         let clock_s = self.objective.on(Some(index as u16)).duration_s();
         let joint = variation.apply(diagnosed);
@@ -400,9 +408,15 @@ impl Case<'_> {
         let calibrated = Layout::of(self.model).calibrated(self.model);
         let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
         let of_bench: Vec<&Recalibrated> = recalibrated.iter().filter(|one| one.is_of(&bench.name)).collect();
-        let undecided =
+        let mut undecided =
             off_centre::undecided(self.objective, &of_bench, &joint.effects, &bench.rig.undecided);
-        BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted, undecided }
+        if selected.complete {
+            let believed = at_search_resolution(self.model, self.model);
+            let instead_of =
+                |held: Held, ids: &[&str]| selected.instead_of(held, ids, self.objective, &believed);
+            undecided = taken_up::undecided(self.model, &of_bench, &joint.effects, undecided, instead_of)?;
+        }
+        Ok(BenchNow { joint: afterwards(&joint, stated_effects, clock_s), stated_effects, fitted, undecided })
     }
 
     /// Adds the hum of sensors that `model` leaves.
@@ -441,19 +455,6 @@ impl Case<'_> {
     fn bench_of(&self, effect: &ActiveEffect) -> Option<String> {
         let (bench, _) = self.benches.get(usize::from(effect.bench?))?;
         Some(bench.name.clone())
-    }
-
-    /// Whether the joint has tendons of which no recording holds a tension.
-    ///
-    /// Then little more than the product of friction and pretension is seen. Fitted without what is ordinary, the two run off
-    /// against each other to make up for it, and the tensions with them: the values that were found beside it are kept.
-    fn tensions_unseen(&self) -> bool {
-        let is_tension = |series: &Series| match series {
-            Series::Channel(channel) => Channel::TENSIONS.contains(channel),
-            Series::Guide => false,
-        };
-        self.model.parameters.tendon.is_some()
-            && !self.objective.scales().iter().any(|(series, _)| is_tension(series))
     }
 
     fn report(
@@ -582,8 +583,9 @@ impl Case<'_> {
         let mut indistinguishable =
             crate::fit::identifiability::indistinguishable(objective, &coarse).unwrap_or_default();
         let benches = 0..self.benches.len();
-        let now: Vec<BenchNow> =
-            benches.map(|bench| self.now(bench, &last.model, &recalibrated_parameters)).collect();
+        let now: Result<Vec<BenchNow>, Failure> =
+            benches.map(|bench| self.now(bench, selected, &last.model, &recalibrated_parameters)).collect();
+        let now = now?;
         for ((bench, _), now) in self.benches.iter().zip(&now) {
             for undecided in &now.undecided {
                 let is_it =

@@ -30,6 +30,9 @@ pub struct OwnParameter {
     pub value: Option<f64>,
 }
 
+/// The parameter that only tensions tell.
+pub(crate) const PRETENSION: &str = "tendon.pretension_n";
+
 /// All parameters with values of their own on single benches.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OwnParameters {
@@ -232,6 +235,12 @@ impl JointModel {
         const ASKED_FOR: f64 = 10.0;
         let asked_for = self.guided_by.map(|guided| ASKED_FOR * guided.driven_nm).filter(|nm| *nm > 0.0);
         asked_for.or_else(|| self.parameters.motor.as_ref().map(pulley_stall_torque_nm))
+    }
+
+    /// Whether no recording that it is fitted to holds a tension of its tendons.
+    #[must_use]
+    pub fn tensions_unseen(&self) -> bool {
+        self.own.untold.iter().any(|parameter| parameter.to_string() == PRETENSION)
     }
 
     /// Inertia of rotor and load about the spindle of a joint without tendons, kg·m².

@@ -143,19 +143,19 @@ pub fn replay_passes_into(
         return Ok(());
     }
     if passes == Passes::First {
-        run.execute(input.hold.first_pass(), outputs, sink);
+        run.execute(input.hold.first_pass(model), outputs, sink);
         return Ok(());
     }
     let rough = Run { pace: Pace::rough(model, input, &config), ..run };
     if passes == Passes::Rough {
-        rough.execute(input.hold.first_pass(), outputs, sink);
+        rough.execute(input.hold.first_pass(model), outputs, sink);
         return Ok(());
     }
     let ahead_nm = rough.ahead_nm(sink);
     if sink.is_stopped() {
         return Ok(());
     }
-    run.execute(input.hold.second_pass(&ahead_nm), outputs, sink);
+    run.execute(input.hold.second_pass(model, &ahead_nm), outputs, sink);
     Ok(())
 }
 
@@ -166,7 +166,7 @@ impl Run<'_> {
         let prediction =
             Prediction { channels: Vec::new(), guide_nm: Vec::with_capacity(self.input.t_s.len()) };
         let mut first = StoppedBy { prediction, sink };
-        self.execute(self.input.hold.first_pass(), &[], &mut first);
+        self.execute(self.input.hold.first_pass(self.model), &[], &mut first);
         let half = (FILTER_S / self.input.step_s).round() as usize;
         moving_average(moving_average(first.prediction.guide_nm, half), half)
     }
@@ -178,7 +178,9 @@ mod tests {
     use bowden_model::effects::CATALOGUE;
 
     use super::*;
+    use crate::joint_model::PRETENSION;
     use crate::recording::Recording;
+    use crate::rig::RigParameter;
     use crate::test_bench;
 
     /// What screening takes for a simulation with one more sensor effect is that simulation, bit for bit.
@@ -260,6 +262,31 @@ mod tests {
             assert!(same(values, of_weak.channel(channel).unwrap(), share), "{}", channel.role());
         }
         assert!(same(&of_strong.guide_nm, &of_weak.guide_nm, SHARE), "guide");
+    }
+
+    /// Where no tension is recorded, a joint half as strong is guided by what the strong one is, as it is told; otherwise by about half of it. Both
+    /// are replayed with the input of the strong one, as in a fit.
+    #[test]
+    fn without_tensions_the_guide_is_told_in_proportion_to_the_motor() {
+        const SHARE: f64 = 0.5;
+        let (mut strong, recording) = guided(3000);
+        let mut on_weak = recording.clone();
+        on_weak.set(Channel::BusVoltage, vec![24.0 * SHARE; 3000]);
+        let rms = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / 3000.0).sqrt();
+        let mut apart = |untold: Option<RigParameter>| {
+            strong.own.untold = Vec::from_iter(untold);
+            let weak = test_bench::smaller(strong.clone(), SHARE);
+            let guide_nm = |model: &JointModel, recording: &Recording| {
+                replay(model, &ReplayInput::new(&strong, recording).unwrap()).unwrap().guide_nm
+            };
+            let [of_strong, of_weak] = [guide_nm(&strong, &recording), guide_nm(&weak, &on_weak)];
+            let apart: Vec<f64> =
+                of_strong.iter().zip(&of_weak).map(|(strong, weak)| strong - weak).collect();
+            rms(&apart) / rms(&of_strong)
+        };
+        let [unseen, seen] = [apart(RigParameter::parse(PRETENSION).ok()), apart(None)];
+        assert!(unseen < 1e-6, "{unseen} of the guide");
+        assert!((0.4..0.6).contains(&seen), "{seen} of the guide");
     }
 
     /// A motor with recorded duty, whose pulley swings.

@@ -14,6 +14,7 @@
 //! rank first start from such parameters wherever they predict better.
 
 mod moments;
+mod phases;
 
 use bowden_model::effect::{ActiveEffect, Component};
 use nalgebra::{DMatrix, DVector};
@@ -140,20 +141,20 @@ pub fn screen(
         .flatten();
     let loss_now = now.norm_squared();
     let background = Background { objective, present, basis, missing, rows_now, now, loss_now };
-    let starts: Vec<(usize, ActiveEffect)> = candidates
+    let starts: Vec<(usize, &[ActiveEffect])> = candidates
         .iter()
         .enumerate()
-        .flat_map(|(c, candidate)| candidate.starts.iter().map(move |s| (c, *s)))
+        .flat_map(|(c, candidate)| phases::grouped(&candidate.starts).map(move |starts| (c, starts)))
         .collect();
     let judged: Vec<(usize, Option<Judged>)> = starts
         .par_iter()
-        .map(|(candidate, start)| {
-            let judged = if progress.interrupted() {
-                None
-            } else {
-                background.judge_at_moments(*start).or_else(|| background.judge(*start))
+        .map(|(candidate, starts)| {
+            let judged = match starts {
+                _ if progress.interrupted() => None,
+                [start] => background.judge_at_moments(*start).or_else(|| background.judge(*start)),
+                phases => background.judge_wave(phases, promising),
             };
-            progress.advance(1);
+            progress.advance(starts.len() as u64);
             (*candidate, judged)
         })
         .collect();
@@ -286,11 +287,15 @@ impl Background<'_> {
     }
 
     fn judge(&self, start: ActiveEffect) -> Option<Judged> {
+        Some(self.judge_rows(start, &self.rows_of(start)?))
+    }
+
+    /// The same from the rows of a simulation.
+    fn judge_rows(&self, start: ActiveEffect, there: &DVector<f64>) -> Judged {
         let Self { basis, now, .. } = self;
-        let there = self.rows_of(start)?;
-        let whole_change = (&there - &self.rows_now).norm_squared();
-        let inside = basis.inside(&there);
-        let there = basis.without(&there);
+        let whole_change = (there - &self.rows_now).norm_squared();
+        let inside = basis.inside(there);
+        let there = basis.without(there);
         let gain_of = |loss: f64| 1.0 - loss / self.loss_now.max(f64::MIN_POSITIVE);
         let weight = self.weight(start.bench);
         let mut at_start = Screened::at(start, gain_of(there.norm_squared()), weight);
@@ -323,7 +328,7 @@ impl Background<'_> {
                 too_much = basis.inside(&there);
             }
         }
-        Some(Judged { start: at_start, linear })
+        Judged { start: at_start, linear }
     }
 
     /// Share of the present loss that is left on a bench, or on all.
@@ -554,6 +559,25 @@ mod tests {
         let (found, _) = screened(&model, recording, &[], vec![start]);
         assert!((found.start.parameters[0] / -0.15 - 1.0).abs() < 0.4, "{:?}", found.start.parameters[0]);
         assert!(found.gain > 0.5, "{}", found.gain);
+    }
+
+    /// Halfway between two phases and half as strong again as both; of either phase alone a wave half as large is the best.
+    #[test]
+    fn a_wave_is_tried_at_the_phase_that_both_of_its_phases_say() {
+        use std::f64::consts::FRAC_PI_2;
+        let mut recording = test_bench::swung(6000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let law = bowden_model::law::find("law_tendon_length_over_time").unwrap();
+        let start = ActiveEffect::with_defaults(law).with("amplitude", 0.02).with("frequency_hz", 0.5);
+        record(&model, start.with("amplitude", 0.03).with("phase_rad", -FRAC_PI_2 / 2.0), &mut recording);
+        let both = vec![start.with("phase_rad", 0.0), start.with("phase_rad", FRAC_PI_2)];
+        let alone = screened(&model, recording.clone(), &[], both[..1].to_vec()).0;
+        assert!(alone.gain < 0.7, "{}", alone.gain);
+        let (found, _) = screened(&model, recording, &[], both);
+        let [amplitude, _, phase_rad, ..] = found.start.parameters;
+        assert!((amplitude / 0.03 - 1.0).abs() < 0.2, "{amplitude}");
+        assert!((phase_rad + FRAC_PI_2 / 2.0).abs() < 0.2, "{phase_rad} rad");
+        assert!(found.gain > 0.9, "{}", found.gain);
     }
 
     /// An effect that does nothing at one and not at zero is made stronger too, from one tenth more to nine tenths.

@@ -11,6 +11,7 @@ mod across;
 mod begin_again;
 mod exchange;
 mod hypotheses;
+mod instead;
 mod kinds;
 mod laws;
 mod loudest;
@@ -42,6 +43,7 @@ use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 pub use hypotheses::{BestRival, Trial};
+pub(super) use instead::Held;
 use loudest::{without_the_loudest, without_the_loudest_moment};
 
 /// Number of candidates that are fitted to convergence.
@@ -264,6 +266,7 @@ pub fn select(
     let mut now = Explanation { fit: nothing.clone(), chosen: Vec::new() };
     let mut rounds = Vec::new();
     search.add_names(&mut now, &mut rounds, Policy::worth_naming)?;
+    search.add_taken_up(&mut now, &mut rounds, Policy::worth_naming)?;
     let mut again = now.clone();
     search.with_laws(&nothing, &mut now, &mut rounds)?;
     if again.fit.loss > POLICY.much_left

@@ -46,7 +46,7 @@ pub(super) struct Guide<'a> {
     pub lead_s: Option<f64>,
     /// Torque at each sample that needs no angle to be left for it; none where it is empty.
     pub ahead_nm: &'a [f64],
-    /// What these torques are divided by where they act, see [`Hold::only_pass`].
+    /// What these torques are divided by where they act, see [`Hold::shown`].
     pub shown: f64,
 }
 
@@ -65,6 +65,17 @@ pub(super) struct Hold {
     pub loose_nm_per_rad: f64,
     /// Inertia of a joint without tendons, kg·m².
     direct_kg_m2: Option<f64>,
+    /// Torque at the input pulley for a current, N·m/A, of a joint with tendons whose tensions no recording holds.
+    motor_nm_per_a: Option<f64>,
+}
+
+/// Torque at the input pulley for a current, N·m/A.
+fn pulley_nm_per_a(model: &JointModel) -> Option<f64> {
+    model
+        .parameters
+        .motor
+        .map(|motor| motor.torque_constant_nm_per_a * motor.gear_ratio)
+        .filter(|nm_per_a| *nm_per_a > 0.0)
 }
 
 impl Hold {
@@ -81,6 +92,7 @@ impl Hold {
                 lead_s: None,
                 loose_nm_per_rad: PLAY_GUIDE * cables_nm_per_rad,
                 direct_kg_m2: None,
+                motor_nm_per_a: pulley_nm_per_a(model).filter(|_| model.tensions_unseen()),
             };
         }
         let inertia_kg_m2 = model.direct_inertia_kg_m2();
@@ -90,28 +102,37 @@ impl Hold {
             lead_s: Some(2.0 / (LEAD * held_rad_s)),
             loose_nm_per_rad: 0.0,
             direct_kg_m2: Some(inertia_kg_m2).filter(|inertia_kg_m2| *inertia_kg_m2 > 0.0),
+            motor_nm_per_a: None,
         }
     }
 
-    /// Guide of the first pass with tendons.
-    pub fn first_pass(&self) -> Guide<'static> {
-        self.guide(self.passes_nm_per_rad[0], &[], 1.0)
+    /// Guide of the first pass of `model` with tendons.
+    pub fn first_pass(&self, model: &JointModel) -> Guide<'static> {
+        self.guide(self.passes_nm_per_rad[0], &[], self.shown(model))
     }
 
-    /// Guide of the second pass with tendons, beside a torque that is applied ahead.
-    pub fn second_pass<'a>(&self, ahead_nm: &'a [f64]) -> Guide<'a> {
-        self.guide(self.passes_nm_per_rad[1], ahead_nm, 1.0)
+    /// Guide of the second pass of `model` with tendons, beside a torque that is applied ahead.
+    pub fn second_pass<'a>(&self, model: &JointModel, ahead_nm: &'a [f64]) -> Guide<'a> {
+        self.guide(self.passes_nm_per_rad[1], ahead_nm, self.shown(model))
     }
 
     /// Guide of the only pass of `model` without tendons.
-    ///
-    /// Of all torques nothing is recorded but the duty: a motor half as strong, with half of all inertia and friction, moves alike and is guided
-    /// by half the torque, and so is one whose friction takes half of its torque. What is compared is therefore an acceleration, stated as
-    /// the torque that it takes with the inertia of the model that the input was prepared for. A torque would be made small by a light joint.
     pub fn only_pass(&self, model: &JointModel) -> Guide<'static> {
-        let now_kg_m2 = model.direct_inertia_kg_m2();
-        let shown = self.direct_kg_m2.filter(|_| now_kg_m2 > 0.0).map_or(1.0, |kg_m2| kg_m2 / now_kg_m2);
-        self.guide(self.passes_nm_per_rad[1], &[], shown)
+        self.guide(self.passes_nm_per_rad[1], &[], self.shown(model))
+    }
+
+    /// What the torques of the guide are divided by where they act on `model`.
+    ///
+    /// Where neither a torque nor a tension is recorded a motor half as strong, with half of all inertia, stiffness and friction, moves alike and
+    /// is guided by half the torque, and so is one whose friction takes half of its torque. Without tendons what is compared is therefore
+    /// an acceleration, with them a current, stated as the torque that it takes with the inertia or the motor of the model that the input was
+    /// prepared for. A torque would be made small by a light joint or a weak motor.
+    fn shown(&self, model: &JointModel) -> f64 {
+        let [before, now] = match (self.direct_kg_m2, self.motor_nm_per_a) {
+            (Some(kg_m2), _) => [Some(kg_m2), Some(model.direct_inertia_kg_m2()).filter(|now| *now > 0.0)],
+            (None, before) => [before, pulley_nm_per_a(model)],
+        };
+        before.zip(now).map_or(1.0, |(before, now)| before / now)
     }
 
     fn guide<'a>(&self, stiffness_nm_per_rad: f64, ahead_nm: &'a [f64], shown: f64) -> Guide<'a> {

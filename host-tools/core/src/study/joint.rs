@@ -6,7 +6,7 @@ use super::{Bench, Role, Study, StudyRecording};
 use crate::fit::calibrated::{CALIBRATED, Calibrated, Of};
 use crate::fit::observed::{Observed, Use};
 use crate::fit::variation::Variation;
-use crate::joint_model::{JointModel, OwnParameter, OwnParameters};
+use crate::joint_model::{JointModel, OwnParameter, OwnParameters, PRETENSION};
 use crate::outcome::Failure;
 use crate::recording::Recording;
 use crate::rig::RigParameter;
@@ -53,7 +53,7 @@ impl Study {
         if joint.parameters.sheath.is_none() || fitted.any(holds_tension) {
             return Vec::new();
         }
-        RigParameter::parse("tendon.pretension_n").into_iter().collect()
+        RigParameter::parse(PRETENSION).into_iter().collect()
     }
 
     /// The recordings with their differences from `joint`, that of [`Study::joint`]; held-out ones last. Where none is held out,

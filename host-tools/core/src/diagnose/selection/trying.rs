@@ -1,5 +1,6 @@
 //! One round of the search: the candidates that screening ranks first are fitted coarsely, and the best of these to convergence.
 
+use bowden_model::parameters::NOMINAL_PARAMETERS;
 use rayon::prelude::*;
 
 use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
@@ -9,6 +10,7 @@ use crate::diagnose::layout::Layout;
 use crate::diagnose::one_body::turns_as_one;
 use crate::diagnose::onset::{between_recordings, moment_of};
 use crate::diagnose::screening::{Present, Screened, screen};
+use crate::fit::calibrated::spread;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Known, Slopes, solve_for_ranking};
 use crate::joint_model::{Drive, JointModel};
 use crate::outcome::Failure;
@@ -38,6 +40,9 @@ const DECIDED: f64 = 5.0;
 /// Minimum reduction of the loss, relative to the estimate of screening, by a fit that reuses the sensitivities of the present model; a
 /// candidate below it is refitted with its own sensitivities.
 const KEPT_PROMISE: f64 = 0.5;
+
+/// Distance of a nominal parameter from what the rig states, in standard deviations of what is believed of it, from which on it has run off.
+const RUN_OFF: f64 = 3.0;
 
 impl Search<'_> {
     /// Tries every further effect in addition to those of `present`: screens all, fits the first coarsely, and fits the best of these to
@@ -197,7 +202,33 @@ impl Search<'_> {
             }
             Ok::<(), Failure>(())
         })?;
+        if let Some(anew) = self.anew(present) {
+            fits.par_iter_mut().try_for_each(|(place, fitted)| {
+                let screened = Screened { room: Some(anew.clone()), ..ranked[*place].clone() };
+                if !progress.interrupted() {
+                    let other = self.fit_new(present, slopes, &screened, false)?;
+                    if other.loss < fitted.loss {
+                        *fitted = other;
+                    }
+                }
+                Ok::<(), Failure>(())
+            })?;
+        }
         Ok(fits)
+    }
+
+    /// `present` with the parameters that the rig states, where one of them has run off to make up for what is missing: the optimiser finds no
+    /// way back from there in small steps.
+    fn anew(&self, present: &Fitted) -> Option<JointModel> {
+        let model = &present.solution.model;
+        let has_run_off = NOMINAL_PARAMETERS.iter().any(|parameter| {
+            let [before, now] =
+                [&self.believed.parameters, &model.parameters].map(|joint| parameter.get(joint));
+            before.zip(now).is_some_and(|(before, now)| {
+                before > 0.0 && (now / before).ln().abs() > RUN_OFF * spread(parameter)
+            })
+        });
+        has_run_off.then(|| JointModel { parameters: self.believed.parameters, ..model.clone() })
     }
 
     /// Coarse fit of `present` with one more effect, with the sensitivities of `present`, in `slopes`, or its own.
@@ -260,5 +291,23 @@ mod tests {
         let near = beside(1.1 * coarse.loss / DECIDED);
         assert!(near.finished && near.loss < coarse.loss, "{}, coarse {}", near.loss, coarse.loss);
         assert!((near.loss / whole.loss - 1.0).abs() < 1e-3, "{}, in one {}", near.loss, whole.loss);
+    }
+
+    /// The friction coefficient is believed within a factor of e^0.5: 3.9 times of it is within three of these, 5 times is not.
+    #[test]
+    fn candidates_are_fitted_anew_where_a_parameter_has_run_off() {
+        let recording = test_bench::swung(1000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let asked = Asked::default();
+        let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
+        let anew = |times: f64| {
+            let mut fitted = model.clone();
+            fitted.parameters.sheath.as_mut().unwrap().friction_coefficient *= times;
+            fitted.effects.push(ActiveEffect::with_defaults(find("joint_spring").unwrap()));
+            let present = search.fit(Layout::of(&model), &fitted, &[]).unwrap();
+            search.anew(&present).map(|anew| (anew.parameters == model.parameters, anew.effects.len()))
+        };
+        assert_eq!([3.9, 5.0, 0.25, 0.2].map(anew), [None, Some((true, 1)), None, Some((true, 1))]);
     }
 }
