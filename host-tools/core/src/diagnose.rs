@@ -409,7 +409,7 @@ impl Case<'_> {
         let fitted = calibrated.iter().filter_map(|free| free.parameter(self.model)).collect();
         let of_bench: Vec<&Recalibrated> = recalibrated.iter().filter(|one| one.is_of(&bench.name)).collect();
         let mut undecided =
-            off_centre::undecided(self.objective, &of_bench, &joint.effects, &bench.rig.undecided);
+            off_centre::undecided(self.objective, &joint, &of_bench, &joint.effects, &bench.rig.undecided);
         if selected.complete {
             let believed = at_search_resolution(self.model, self.model);
             let instead_of =
