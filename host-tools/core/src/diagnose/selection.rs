@@ -15,6 +15,7 @@ mod instead;
 mod kinds;
 mod laws;
 mod loudest;
+mod moments;
 mod names;
 mod one_bench;
 mod own_channel;

@@ -13,6 +13,9 @@ use crate::outcome::Failure;
 /// Maximum number of named effects.
 const MOST_EFFECTS: usize = 6;
 
+/// Times that effects are added after moments of others have moved.
+const MOST_MOVES: usize = 3;
+
 /// Losses of a round in which a nuisance term at its upper bound was left out.
 #[derive(Clone, Copy)]
 struct Losses {
@@ -47,6 +50,24 @@ impl Search<'_> {
         rounds: &mut Vec<Round>,
         worth: Worth,
     ) -> Result<(), Failure> {
+        for _ in 0..MOST_MOVES {
+            self.add_while_worth(now, rounds, worth)?;
+            if !self.find_moments_again(now)? {
+                break;
+            }
+        }
+        self.choose_kinds_again(now)?;
+        self.exchange(now)?;
+        if self.progress.interrupted() { Ok(()) } else { self.prune(now) }
+    }
+
+    /// Adds effects one by one while one reaches the threshold.
+    fn add_while_worth(
+        &self,
+        now: &mut Explanation,
+        rounds: &mut Vec<Round>,
+        worth: Worth,
+    ) -> Result<(), Failure> {
         while now.names() < MOST_EFFECTS && !self.progress.interrupted() {
             let before = self.without_exhausted(&now.fit)?;
             let tried = self.one_more(&before, Kind::Name, PROMISING, None)?;
@@ -57,9 +78,7 @@ impl Search<'_> {
             self.add_instances(now)?;
             self.add_on_other_benches(now, rounds, worth)?;
         }
-        self.choose_kinds_again(now)?;
-        self.exchange(now)?;
-        if self.progress.interrupted() { Ok(()) } else { self.prune(now) }
+        Ok(())
     }
 
     /// Adds the best of what was tried relative to `before`, if it is selected, and returns whether one was.
