@@ -29,7 +29,7 @@ use std::cmp::Ordering;
 
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
 use bowden_model::effects::find;
-use bowden_model::law;
+use bowden_model::law::{self, Form};
 
 use super::hypotheses::Asked;
 use super::layout::{Layout, largest_ordinary};
@@ -424,15 +424,15 @@ impl Fitted {
         self.handicapped_by(&self.newest())
     }
 
-    /// Loss times the factor of `effect`, where that acts.
+    /// Loss times the factor of `effect`, where that acts, and what its form must take off a simpler one.
     fn handicapped_by(&self, effect: &ActiveEffect) -> f64 {
         let factor = handicap(effect);
         if effect.bench.is_none() {
-            return factor * self.loss;
+            return factor * self.loss + price_of_form(effect);
         }
         let count = |losses: &StretchLosses| losses.values().map(|[_, count]| count).sum::<f64>();
         let weight = count(&self.stretch_losses_on(effect.bench)) / count(&self.stretch_losses).max(1.0);
-        self.loss + weight * (factor - 1.0) * self.loss_on(effect.bench)
+        self.loss + weight * ((factor - 1.0) * self.loss_on(effect.bench) + price_of_form(effect))
     }
 
     fn best_first(&self, other: &Self) -> Ordering {
@@ -572,6 +572,13 @@ fn handicap(effect: &ActiveEffect) -> f64 {
     let is_unusual = law::of(effect).is_some() || parameters.iter().zip(effect.parameters).any(unusual);
     let fitted = parameters.iter().filter(|spec| !spec.is_choice).count();
     POLICY.handicap(fitted, !is_unusual)
+}
+
+/// What the loss must fall by for the form of an effect to be preferred to the simpler form that it contains: below the noise a share of the loss
+/// is nothing. A power of the speed that differs with the direction contains the same power without that.
+fn price_of_form(effect: &ActiveEffect) -> f64 {
+    let contains_another = law::of(effect).is_some_and(|law| law.form() == Form::DirectedPower);
+    if contains_another { POLICY.name_loss } else { 0.0 }
 }
 
 /// Whether a fitted effect is negligible: too weak, within the tolerances of an ordinary bench, or active over too little travel.
