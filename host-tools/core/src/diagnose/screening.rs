@@ -296,9 +296,8 @@ impl Background<'_> {
         let whole_change = (there - &self.rows_now).norm_squared();
         let inside = basis.inside(there);
         let there = basis.without(there);
-        let gain_of = |loss: f64| 1.0 - loss / self.loss_now.max(f64::MIN_POSITIVE);
         let weight = self.weight(start.bench);
-        let mut at_start = Screened::at(start, gain_of(there.norm_squared()), weight);
+        let mut at_start = Screened::at(start, self.gain_of(there.norm_squared()), weight);
         let direction = &there - now;
         let along = direction.norm_squared();
         let step = if along > 0.0 { -now.dot(&direction) / along } else { 0.0 };
@@ -309,7 +308,7 @@ impl Background<'_> {
             moved.parameters[0] = neutral + step * (start.parameters[0] - neutral);
             let possible = step > 0.0 || moved.parameters[0] >= spec.lower;
             moved.parameters[0] = moved.parameters[0].clamp(spec.lower, spec.upper);
-            let gain = gain_of((now + direction * step).norm_squared());
+            let gain = self.gain_of((now + direction * step).norm_squared());
             possible.then(|| Screened::at(moved, gain, weight))
         });
         if along < (1.0 - IN_PLACE_OF) * whole_change {
@@ -320,7 +319,7 @@ impl Background<'_> {
                 x.apply(|x| *x = x.clamp(-ROOM, ROOM));
                 let room = self.with_parameters_at(&x);
                 let Some(there) = self.rows_beside(&room, start) else { break };
-                let gain = gain_of(basis.without(&there).norm_squared());
+                let gain = self.gain_of(basis.without(&there).norm_squared());
                 if gain <= at_start.gain {
                     break;
                 }
@@ -329,6 +328,11 @@ impl Background<'_> {
             }
         }
         Judged { start: at_start, linear }
+    }
+
+    /// Share of the present loss that is gone where `loss` is left.
+    fn gain_of(&self, loss: f64) -> f64 {
+        1.0 - loss / self.loss_now.max(f64::MIN_POSITIVE)
     }
 
     /// Share of the present loss that is left on a bench, or on all.
@@ -345,7 +349,7 @@ impl Background<'_> {
     fn judge_again(&self, judged: &Judged) -> Option<Judged> {
         let Some(room) = &judged.start.room else { return self.judge(judged.start.start) };
         let there = self.rows_beside(room, judged.start.start)?;
-        let gain = 1.0 - self.basis.without(&there).norm_squared() / self.loss_now.max(f64::MIN_POSITIVE);
+        let gain = self.gain_of(self.basis.without(&there).norm_squared());
         let start = Screened { gain, ..judged.start.clone() };
         Some(Judged { start, linear: judged.linear.clone() })
     }

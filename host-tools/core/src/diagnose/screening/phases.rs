@@ -16,10 +16,9 @@ pub(super) fn grouped(starts: &[ActiveEffect]) -> impl Iterator<Item = &[ActiveE
 
 /// Whether `second` is the same wave as `first`, a quarter of a turn ahead.
 fn are_phases(first: &ActiveEffect, second: &ActiveEffect) -> bool {
-    let ahead = |effect: &ActiveEffect, phase_rad: f64| effect.with(PHASE, phase_rad);
-    let Some(place) = first.descriptor().index_of(PHASE) else { return false };
-    let quarter = first.parameters[place] + std::f64::consts::FRAC_PI_2;
-    first.is_beside(second) && ahead(first, quarter) == *second
+    first.descriptor().index_of(PHASE).is_some_and(|place| {
+        first.with(PHASE, first.parameters[place] + std::f64::consts::FRAC_PI_2) == *second
+    })
 }
 
 impl Background<'_> {
@@ -32,9 +31,7 @@ impl Background<'_> {
                 let products = [first.norm_squared(), first.dot(&second), second.norm_squared()];
                 let steps = steps(products, [-self.now.dot(&first), -self.now.dot(&second)]);
                 steps.and_then(|[a, b]| {
-                    let gain = 1.0
-                        - (&self.now + first * a + second * b).norm_squared()
-                            / self.loss_now.max(f64::MIN_POSITIVE);
+                    let gain = self.gain_of((&self.now + first * a + second * b).norm_squared());
                     (gain > NEARLY * promising).then(|| between(&phases[0], [a, b]))
                 })
             }

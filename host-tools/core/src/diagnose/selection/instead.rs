@@ -6,8 +6,7 @@
 use bowden_model::effect::ActiveEffect;
 use bowden_model::parameters::NominalParameter;
 
-use super::{Chosen, Explanation, Fitted, PROMISING, Round, Search, Selected, Worth};
-use crate::diagnose::candidates::candidates;
+use super::{Chosen, Explanation, Fitted, Round, Search, Selected, Worth};
 use crate::diagnose::hypotheses::Asked;
 use crate::diagnose::policy::POLICY;
 use crate::diagnose::taken_up::taken_up;
@@ -70,13 +69,8 @@ impl Search<'_> {
         let search = Search { believed: &held(self.believed), ..*self };
         let without =
             search.fit(present.layout.clone(), &held(&present.solution.model), &[COARSE_STEP, FINE_STEP])?;
-        let predictions = self.objective.predict(&without.solution.model)?;
-        let mut candidates = candidates(&without.without_ordinary(), self.objective, &predictions, &[]);
-        candidates.retain(|candidate| {
-            candidate.starts.iter().all(|start| ids.contains(&start.descriptor().id) && start.bench.is_none())
-        });
-        let (_, mut fits) =
-            search.best_of(&without, &predictions, &candidates, PROMISING, Some(present.loss))?;
+        let is_it = |start: &ActiveEffect| ids.contains(&start.descriptor().id) && start.bench.is_none();
+        let mut fits = search.one_of(&without, is_it, present.loss)?;
         // Stick and slip make coarse fits of dry friction differ by more than they tell.
         for coarse in fits.iter_mut().filter(|fitted| !fitted.finished) {
             *coarse = search.finish(coarse)?;

@@ -3,8 +3,7 @@
 //! While much is missing an effect is laid where it also takes off some of that: a pretension that was lost before a drag was known came
 //! out two seconds late. No small step leads a moment back, and what the wrong one leaves shows nowhere else, so that nothing more is found.
 
-use super::{Chosen, Explanation, Fitted, PROMISING, Search, instances, is_further, remove};
-use crate::diagnose::candidates::candidates;
+use super::{Chosen, Explanation, Fitted, Search, instances, is_further, remove};
 use crate::diagnose::onset::moment_of;
 use crate::diagnose::policy::POLICY;
 use crate::fit::solver::{COARSE_STEP, FINE_STEP};
@@ -30,10 +29,7 @@ impl Search<'_> {
         let instances = instances(chosen, index);
         let (layout, without) = present.without(&instances);
         let rest = self.fit(layout, &without, &[COARSE_STEP, FINE_STEP])?;
-        let predictions = self.objective.predict(&rest.solution.model)?;
-        let mut same = candidates(&rest.without_ordinary(), self.objective, &predictions, self.asked.effects);
-        same.retain(|candidate| candidate.starts.iter().all(|start| start.is_beside(&effect)));
-        let (_, fits) = self.best_of(&rest, &predictions, &same, PROMISING, Some(present.loss))?;
+        let fits = self.one_of(&rest, |start| start.is_beside(&effect), present.loss)?;
         let Some(found) = fits.into_iter().find(|fitted| fitted.finished) else { return Ok(false) };
         let found = self.with_ordinary(found)?;
         let is_better = |loss: f64, others_loss: f64| POLICY.worth_having(loss, others_loss, instances.len());
@@ -54,7 +50,7 @@ mod tests {
     use bowden_model::effect::ActiveEffect;
     use bowden_model::effects::find;
 
-    use super::super::Asked;
+    use super::super::{Asked, Policy};
     use super::*;
     use crate::diagnose::layout::Layout;
     use crate::fit::objective::Objective;
@@ -93,7 +89,7 @@ mod tests {
         let mut now = Explanation { fit: both, chosen };
         assert!((time_s(&now.chosen[0]) - TAKEN_OFF_S).abs() > 1.0, "{} s", time_s(&now.chosen[0]));
 
-        assert!(search.find_moments_again(&mut now).unwrap());
+        search.add_names(&mut now, &mut Vec::new(), Policy::worth_naming).unwrap();
         let [springy, lighter] = &now.chosen[..] else { panic!("{}", now.chosen.len()) };
         assert_eq!(springy.effect.descriptor().id, "joint_spring");
         assert!((time_s(lighter) - TAKEN_OFF_S).abs() < 0.1, "{} s", time_s(lighter));

@@ -1,9 +1,10 @@
 //! One round of the search: the candidates that screening ranks first are fitted coarsely, and the best of these to convergence.
 
+use bowden_model::effect::ActiveEffect;
 use bowden_model::parameters::NOMINAL_PARAMETERS;
 use rayon::prelude::*;
 
-use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, Search, negligible};
+use super::{Attempted, FINALISTS, Fitted, Kind, PATIENCE, PROMISING, Search, negligible};
 use crate::diagnose::candidates::{Candidate, candidates};
 use crate::diagnose::law_candidates::law_candidates;
 use crate::diagnose::layout::Layout;
@@ -68,7 +69,22 @@ impl Search<'_> {
         self.best_of(present, &predictions, &all, promising, other_loss)
     }
 
-    /// The same for the given candidates; `predictions` are those of `present`.
+    /// Fits of `present` with each effect of the catalogue that `is_it`, best first, as [`Self::one_more`] finds them.
+    pub(super) fn one_of(
+        &self,
+        present: &Fitted,
+        is_it: impl Fn(&ActiveEffect) -> bool,
+        other_loss: f64,
+    ) -> Result<Vec<Fitted>, Failure> {
+        let predictions = self.objective.predict(&present.solution.model)?;
+        let model = present.without_ordinary();
+        let mut all = candidates(&model, self.objective, &predictions, self.asked.effects);
+        all.retain(|candidate| candidate.starts.iter().all(&is_it));
+        let (_, fits) = self.best_of(present, &predictions, &all, PROMISING, Some(other_loss))?;
+        Ok(fits)
+    }
+
+    /// As [`Self::one_more`] for the given candidates; `predictions` are those of `present`.
     pub(super) fn best_of(
         &self,
         present: &Fitted,
@@ -258,7 +274,6 @@ pub(super) fn drives_tendons(model: &JointModel) -> bool {
 #[cfg(test)]
 mod tests {
     use bowden_model::channel::Channel;
-    use bowden_model::effect::ActiveEffect;
     use bowden_model::effects::find;
 
     use super::super::Asked;
