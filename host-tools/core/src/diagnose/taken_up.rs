@@ -5,37 +5,30 @@
 //! The weight of an arm that hangs is a spring, as far as its travel is short.
 
 use bowden_model::effect::{ActiveEffect, Target};
-use bowden_model::parameters::nominal;
 
 use super::selection::Held;
 use super::verdict::Recalibrated;
 use crate::fit::calibrated::wrong_from;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
-use crate::rig::Undecided;
+use crate::rig::{RigParameter, Undecided};
 
-/// A parameter and the effects that a larger value of it takes up.
+/// A parameter, `SECTION.NAME`, and the effects that a larger value of it takes up.
 struct TakesUp {
-    section: &'static str,
-    name: &'static str,
+    parameter: &'static str,
     effects: &'static [&'static str],
 }
 
 /// All of them.
 const TAKES_UP: [TakesUp; 2] = [
     TakesUp {
-        section: "sheath",
-        name: "friction_coefficient",
+        parameter: "sheath.friction_coefficient",
         effects: &["motor_coulomb_friction", "gear_load_friction", "joint_coulomb_friction"],
     },
-    TakesUp { section: "load", name: "mass_kg", effects: &["joint_spring"] },
+    TakesUp { parameter: "load.mass_kg", effects: &["joint_spring"] },
 ];
 
 impl TakesUp {
-    fn path(&self) -> String {
-        format!("{}.{}", self.section, self.name)
-    }
-
     /// Those of its effects that are not among `named`.
     fn beside(&self, named: &[ActiveEffect]) -> Vec<&'static str> {
         let is_named = |id: &&str| named.iter().any(|effect| effect.descriptor().id == *id);
@@ -51,9 +44,9 @@ pub(super) fn taken_up(
     named: &[ActiveEffect],
 ) -> Vec<(Held, Vec<&'static str>)> {
     let grown = |one: &TakesUp| {
-        let parameter = nominal(one.section, one.name)?;
-        let [before, now] = [believed, fitted].map(|model| parameter.get(&model.parameters));
-        let has_grown = now? > (1.0 + wrong_from(&one.path())) * before?;
+        let parameter = RigParameter::parse(one.parameter).ok()?;
+        let [before, now] = [believed, fitted].map(|model| model.value(&parameter));
+        let has_grown = now? > (1.0 + wrong_from(one.parameter)) * before?;
         (has_grown && believed.tensions_unseen()).then_some(((parameter, before?), one.beside(named)))
     };
     TAKES_UP.iter().filter_map(grown).collect()
@@ -73,10 +66,14 @@ pub(super) fn undecided(
 ) -> Result<Vec<Undecided>, Failure> {
     let mut all = stated;
     for one in &TAKES_UP {
-        let path = one.path();
-        let fitted = recalibrated.iter().find(|fitted| fitted.parameter == path && fitted.bench.is_none());
-        let (Some(fitted), Some(parameter)) = (fitted, nominal(one.section, one.name)) else { continue };
-        let is_judged = |stated: &Undecided| stated.parameter == path && one.effects.contains(&stated.effect);
+        let is_it = |fitted: &&&Recalibrated| fitted.parameter == one.parameter && fitted.bench.is_none();
+        let (Some(fitted), Ok(parameter)) =
+            (recalibrated.iter().find(is_it), RigParameter::parse(one.parameter))
+        else {
+            continue;
+        };
+        let is_judged =
+            |stated: &Undecided| stated.parameter == one.parameter && one.effects.contains(&stated.effect);
         let before =
             all.iter().find(|stated| is_judged(stated)).map_or(fitted.nominal, |stated| stated.before);
         all.retain(|stated| !is_judged(stated));
@@ -84,7 +81,7 @@ pub(super) fn undecided(
         if model.tensions_unseen() && since.is_wrong() && since.change() > 0.0 {
             let rivals = instead_of((parameter, before), &one.beside(named))?;
             all.extend(rivals.iter().map(|effect| Undecided {
-                parameter: path.clone(),
+                parameter: one.parameter.to_owned(),
                 before,
                 effect: effect.descriptor().id,
                 target: Target::None,
@@ -100,7 +97,6 @@ mod tests {
 
     use super::*;
     use crate::joint_model::PRETENSION;
-    use crate::rig::RigParameter;
     use crate::test_bench;
 
     const COEFFICIENT: &str = "sheath.friction_coefficient";
@@ -122,7 +118,7 @@ mod tests {
         let held = |unseen, share| taken_up(&model(unseen, 1.0), &model(unseen, share), &[effect(COULOMB)]);
         let stated = model(true, 1.0).parameters.sheath.unwrap().friction_coefficient;
         let ((parameter, value), effects) = held(true, 1.2).remove(0);
-        assert_eq!((parameter.spec.name, value), ("friction_coefficient", stated));
+        assert_eq!((parameter.to_string().as_str(), value), (COEFFICIENT, stated));
         assert_eq!(effects, ["motor_coulomb_friction", "gear_load_friction"]);
         for (unseen, share) in [(true, 1.1), (true, 0.8), (false, 1.2)] {
             assert!(held(unseen, share).is_empty(), "{unseen}, {share}");

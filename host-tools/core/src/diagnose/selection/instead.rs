@@ -4,7 +4,6 @@
 //! parameter where it was cannot be foretold from slopes: the parameter is held there, and the effect fitted in its place.
 
 use bowden_model::effect::ActiveEffect;
-use bowden_model::parameters::NominalParameter;
 
 use super::{Chosen, Explanation, Fitted, Round, Search, Selected, Worth};
 use crate::diagnose::hypotheses::Asked;
@@ -18,7 +17,7 @@ use crate::progress::Quiet;
 use crate::rig::RigParameter;
 
 /// A parameter that is held, and its value.
-pub(in crate::diagnose) type Held = (&'static NominalParameter, f64);
+pub(in crate::diagnose) type Held = (RigParameter, f64);
 
 impl Search<'_> {
     /// Adds effects that a larger parameter has taken up, where no tension shows which of the two it is, and those that are found beside them.
@@ -61,9 +60,9 @@ impl Search<'_> {
     ) -> Result<Vec<Fitted>, Failure> {
         let held = |model: &JointModel| {
             let mut held = model.clone();
-            parameter.set(&mut held.parameters, value);
+            held.set_value(&parameter, value);
             // What is untold is not fitted.
-            held.own.untold.push(RigParameter::Nominal(parameter));
+            held.own.untold.push(parameter);
             held
         };
         let search = Search { believed: &held(self.believed), ..*self };
