@@ -245,8 +245,10 @@ pub struct MotorPort {
     pub carried_torque_nm: f64,
     /// Torque that an effect adds, N·m at the input pulley; positive accelerates it.
     pub torque_nm: f64,
-    /// Level of dry friction, N·m ≥ 0; it opposes motion and never reverses it.
+    /// Level of dry friction in sliding at this speed, N·m ≥ 0; it opposes motion and never reverses it.
     pub coulomb_nm: f64,
+    /// By how much its level at standstill is higher, N·m ≥ 0.
+    pub standstill_excess_nm: f64,
     /// Turn over which dry friction builds up after a reversal, rad > 0.
     pub presliding_rad: f64,
     /// How it does.
@@ -261,8 +263,12 @@ impl MotorPort {
     /// Its dry friction.
     #[must_use]
     #[inline]
-    pub const fn dry_friction(&self) -> DryFriction {
-        DryFriction { level_nm: self.coulomb_nm, travel_rad: self.presliding_rad, build_up: self.build_up }
+    pub fn dry_friction(&self) -> DryFriction {
+        let level_nm = self.coulomb_nm + self.standstill_excess_nm;
+        // Above 0, as the law divides by it; what is left is less than any torque that a recording shows.
+        let sliding =
+            if self.standstill_excess_nm == 0.0 { 1.0 } else { (self.coulomb_nm / level_nm).max(1e-6) };
+        DryFriction { level_nm, sliding, travel_rad: self.presliding_rad, build_up: self.build_up }
     }
 }
 
@@ -361,7 +367,12 @@ impl JointPort {
     #[must_use]
     #[inline]
     pub const fn dry_friction(&self) -> DryFriction {
-        DryFriction { level_nm: self.coulomb_nm, travel_rad: self.presliding_rad, build_up: self.build_up }
+        DryFriction {
+            level_nm: self.coulomb_nm,
+            sliding: 1.0,
+            travel_rad: self.presliding_rad,
+            build_up: self.build_up,
+        }
     }
 }
 
@@ -421,6 +432,11 @@ pub trait Effect: Sync {
     fn remainder(&self, parameters: &[f64; MAX_PARAMETERS]) -> Option<(&'static str, f64)> {
         let _ = parameters;
         None
+    }
+
+    /// From where a fit finds its other kind, from parameters that were fitted in one; the caller sets the kind itself.
+    fn parameters_in_other_kind(&self, fitted: &[f64; MAX_PARAMETERS]) -> [f64; MAX_PARAMETERS] {
+        *fitted
     }
 
     /// Parameter in which several instances of it on one part differ, a ratio of 5 % at least; `None` where a part has it once.
@@ -600,6 +616,16 @@ impl ActiveEffect {
             })
         };
         self.is_beside(other) && !self.effect.instances_differ_in().is_some_and(differ)
+    }
+
+    /// The same effect in its other kind, from where a fit finds that; `None` where there is one kind of it.
+    #[must_use]
+    pub fn in_other_kind(mut self) -> Option<Self> {
+        let kind = self.descriptor().parameters.iter().position(|spec| spec.is_choice)?;
+        let other = 1.0 - self.parameters[kind];
+        self.parameters = self.effect.parameters_in_other_kind(&self.parameters);
+        self.parameters[kind] = other;
+        Some(self)
     }
 
     /// The same effect with one parameter set by name; unchanged when it has no such parameter.

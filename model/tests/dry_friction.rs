@@ -2,8 +2,30 @@
 
 use bowden_model::dry_friction::{BuildUp, DryFriction};
 
-const LINEAR: DryFriction = DryFriction { level_nm: 0.08, travel_rad: 2e-3, build_up: BuildUp::Linear };
+const LINEAR: DryFriction =
+    DryFriction { level_nm: 0.08, sliding: 1.0, travel_rad: 2e-3, build_up: BuildUp::Linear };
 const EXPONENTIAL: DryFriction = DryFriction { build_up: BuildUp::Exponential, ..LINEAR };
+/// At a speed at which two fifths of the level are left.
+const SLIDING: [DryFriction; 2] =
+    [DryFriction { sliding: 0.4, ..LINEAR }, DryFriction { sliding: 0.4, ..EXPONENTIAL }];
+
+/// Friction as at standstill, at a speed that leaves a share `s` of it: a spring gives the rest up at once, what gives way ever more slowly
+/// over the turn, by hand `s + (1 - s) e^{-x/s}` after `x` turns; and what is behind that share comes up to it, `s - (s + 1) e^{-x/s}`.
+#[test]
+fn friction_follows_a_level_that_fell_over_the_turn() {
+    let [spring, lagging] = SLIDING;
+    assert_eq!([1e-9, 1e-3, 1.0].map(|turn_rad| spring.acting(1.0, turn_rad)), [0.4; 3]);
+    for (from, step, within) in
+        [(1.0, 0.04, 0.03), (1.0, 0.004, 0.003), (-1.0, 0.04, 0.04), (-1.0, 0.004, 0.004)]
+    {
+        let mut acting = from;
+        for k in 1..=(4.0 / step) as usize {
+            acting = lagging.acting(acting, step * lagging.travel_rad);
+            let expected = 0.4 + (from - 0.4) * (-(k as f64) * step / 0.4).exp();
+            assert!((acting - expected).abs() < within, "from {from} after {k} steps: {acting}, {expected}");
+        }
+    }
+}
 
 /// From friction fully the other way: by hand `-1 + x` and `1 - 2 e^{-x}` after `x` turns. In steps of a tenth of a turn the exponential stays
 /// within 0.04, in steps of a hundredth within 0.004.
@@ -28,12 +50,15 @@ fn after_a_reversal_it_builds_up_as_dahls_law_says() {
 /// However long the step and whichever way: no more than the level, and a turn back undoes nothing beyond it.
 #[test]
 fn no_turn_takes_it_beyond_its_level() {
-    for friction in [LINEAR, EXPONENTIAL] {
+    for friction in [LINEAR, EXPONENTIAL].into_iter().chain(SLIDING) {
         for before in [-1.0, -0.3, 0.0, 1.0] {
             for turn_rad in [-1e3, -2e-3, 0.0, 1e-9, 5e-2] {
                 let acting = friction.acting(before, turn_rad);
-                assert!(acting.abs() <= 1.0, "{friction:?} {before} {turn_rad}: {acting}");
-                assert!((acting - before) * turn_rad >= 0.0, "{friction:?} {before} {turn_rad}: {acting}");
+                let most = f64::max(f64::abs(before), friction.sliding);
+                assert!(acting.abs() <= most, "{friction:?} {before} {turn_rad}: {acting}");
+                let is_above = before * turn_rad > 0.0 && f64::abs(before) > friction.sliding;
+                let grows = (acting - before) * turn_rad >= 0.0;
+                assert!(grows || is_above, "{friction:?} {before} {turn_rad}: {acting}");
             }
         }
     }
@@ -44,7 +69,7 @@ fn no_turn_takes_it_beyond_its_level() {
 #[test]
 fn the_speed_after_a_step_is_that_of_the_friction_at_its_end() {
     let (rad_s_per_nm, dt_s) = (2.0, 1e-3);
-    for friction in [LINEAR, EXPONENTIAL] {
+    for friction in [LINEAR, EXPONENTIAL].into_iter().chain(SLIDING) {
         for before in [-1.0, -0.4, 0.0, 0.7, 1.0] {
             for omega_rad_s in [-30.0, -0.2, -1e-3, 0.0, 1e-6, 0.05, 0.16, 4.0] {
                 let mut acting = before;
@@ -66,7 +91,7 @@ fn the_speed_after_a_step_is_that_of_the_friction_at_its_end() {
 /// back, so that a step falls short.)
 #[test]
 fn its_stiffness_is_the_slope_of_its_torque() {
-    for friction in [LINEAR, EXPONENTIAL] {
+    for friction in [LINEAR, EXPONENTIAL, SLIDING[1]] {
         for before in [-0.9, 0.0, 0.6] {
             for turned_rad in [-1e-4, 0.0, 2e-4, 6e-4] {
                 for way in [-1.0, 1.0] {

@@ -251,7 +251,10 @@ impl Case<'_> {
                 let [without, with] =
                     [&left, &last].map(|fitted| objective.mean_loss(&fitted.residuals, Part::Training));
                 // An interval is as wide as two parameters are alike, and contains zero also where what it belongs to is missing.
-                if intervals_count && POLICY.worth_naming(without, with) {
+                if intervals_count
+                    && (POLICY.worth_naming(without, with)
+                        || selected.has_more_than_remainders(&fewer, objective, model)?)
+                {
                     intervals_count = false;
                     continue;
                 }

@@ -52,13 +52,29 @@ impl Effect for MotorStribeckFriction {
         Some(("motor_coulomb_friction", p[2]))
     }
 
+    /// While friction builds up ever more slowly over the turn, the speed rises and takes the excess away before it has come up to its level: of
+    /// the same torques a fit makes twice the excess over twice the turn, gone at two thirds of the speed.
+    fn parameters_in_other_kind(&self, p: &[f64; MAX_PARAMETERS]) -> [f64; MAX_PARAMETERS] {
+        let more = if p[4] == 0.0 { 2.0 } else { 0.5 };
+        let mut other = *p;
+        other[0] *= more;
+        other[1] *= if p[4] == 0.0 { 2.0 / 3.0 } else { 1.5 };
+        other[3] *= more;
+        for (value, spec) in other.iter_mut().zip(DESCRIPTOR.parameters) {
+            *value = value.clamp(spec.lower, spec.upper);
+        }
+        other
+    }
+
     fn told_apart_by(&self) -> Option<&'static str> {
         Some("constant-speed turns at five speeds from 0.02 to 2 rad/s in both directions, arm unloaded")
     }
 
     fn motor(&self, p: &[f64; MAX_PARAMETERS], _state: &mut EffectState, port: &mut MotorPort) {
         let ratio = port.omega_rad_s / p[1];
-        port.coulomb_nm += p[2] + p[0] * exp(-ratio * ratio);
+        let left = exp(-ratio * ratio);
+        port.coulomb_nm += p[2] + p[0] * left;
+        port.standstill_excess_nm += p[0] * (1.0 - left);
         port.presliding_rad = p[3];
         port.build_up = BuildUp::of_exponent(p[4]);
     }

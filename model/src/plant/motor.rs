@@ -160,6 +160,7 @@ pub(super) fn port(
         carried_torque_nm,
         torque_nm: 0.0,
         coulomb_nm: 0.0,
+        standstill_excess_nm: 0.0,
         presliding_rad: PRESLIDING_RAD,
         build_up: BuildUp::Linear,
         gear_play_rad: 0.0,

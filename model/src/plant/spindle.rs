@@ -123,7 +123,8 @@ impl Spindle {
         let load_nm = -cables_nm;
         let at = [self.theta_rad, self.omega_rad_s];
         let port = motor::port(step, states, at, [0.0, load_nm, load_nm.abs()]);
-        self.presliding = port.dry_friction().acting(self.presliding, delta_rad);
-        self.friction_nm = port.coulomb_nm * self.presliding - port.torque_nm;
+        let friction = port.dry_friction();
+        self.presliding = friction.acting(self.presliding, delta_rad);
+        self.friction_nm = friction.level_nm * self.presliding - port.torque_nm;
     }
 }

@@ -81,6 +81,22 @@ fn standstill_below_breakaway() {
     }
 }
 
+/// At the speed at which the excess has fallen to 1/e the rotor keeps that speed under k (V d - k ω)/R = b ω + 0.04 + 0.08/e, whichever way
+/// friction builds up.
+#[test]
+fn friction_that_falls_with_speed_is_at_its_level_in_steady_sliding() {
+    for exponent in [0.0, 1.0] {
+        let kind = effect("motor_stribeck_friction").with("presliding_exponent", exponent);
+        let level_nm = 0.04 + 0.08 / std::f64::consts::E;
+        let needed = 0.02 * 0.2 + level_nm;
+        let level = (needed * 2.0 / PULLEY_NM_PER_A + PULLEY_NM_PER_A * 0.2) / 24.0;
+        let mut run = free_motor(&[kind], 5e-4);
+        // Led there from above: from below it would stick.
+        run.until(20.0, |t_s| duty(level + 0.02 * (1.0 - t_s / 2.0).max(0.0)));
+        near(&format!("exponent {exponent}"), run.plant.omega_out_rad_s(), 0.2, 1e-6);
+    }
+}
+
 /// Dry friction that builds up ever more slowly gives way by `s ln 10` under nine tenths of it, in proportion by 0.9 `s`.
 #[test]
 fn friction_that_falls_with_speed_builds_up_in_either_way() {
@@ -105,7 +121,7 @@ fn presliding_takes_its_turn_from_the_work_of_a_stroke() {
         let mut work_j = 0.0;
         for _ in 0..4000 {
             // Inertia so large that the speed is what it is.
-            let friction = DryFriction { level_nm, travel_rad, build_up };
+            let friction = DryFriction { level_nm, sliding: 1.0, travel_rad, build_up };
             let speed_rad_s = friction.after_rad_s(&mut presliding, step_rad / 1e-3, 1e-12, 1e-3);
             near("speed", speed_rad_s, step_rad / 1e-3, 1e-9);
             work_j += level_nm * presliding * step_rad;

@@ -20,6 +20,7 @@ mod names;
 mod one_bench;
 mod own_channel;
 mod places;
+mod remainder;
 mod repeating;
 mod rival_laws;
 mod trying;
@@ -28,7 +29,6 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 
 use bowden_model::effect::{ActiveEffect, ParameterSpec};
-use bowden_model::effects::find;
 use bowden_model::law::{self, Form};
 
 use super::hypotheses::Asked;
@@ -39,13 +39,14 @@ use super::onset::moment_of;
 use super::policy::{POLICY, Policy};
 use crate::fit::objective::{Objective, Part, StretchLosses};
 use crate::fit::solver::{COARSE_STEP, FINE_STEP, Solution, solve_in_rounds};
-use crate::fit::typical::{sized, typical};
+use crate::fit::typical::typical;
 use crate::joint_model::JointModel;
 use crate::outcome::Failure;
 use crate::progress::Progress;
 pub use hypotheses::{BestRival, Trial};
 pub(super) use instead::Held;
 use loudest::{without_the_loudest, without_the_loudest_moment};
+use remainder::remainder;
 
 /// Number of candidates that are fitted to convergence.
 const FINALISTS: usize = 3;
@@ -551,24 +552,13 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
     }
 }
 
-/// The effect of the catalogue that remains of a negligible one, if any, with what was fitted to parameters of the same name.
-fn remainder(believed: &JointModel, effect: &ActiveEffect) -> Option<ActiveEffect> {
-    let (id, strength) = effect.effect.remainder(&effect.parameters)?;
-    let mut other = ActiveEffect { target: effect.target, bench: effect.bench, ..sized(believed, find(id)?) };
-    for (parameter, value) in effect.descriptor().parameters.iter().zip(effect.parameters) {
-        let named = other.descriptor().parameters.iter().position(|one| one.name == parameter.name);
-        if let Some(place) = named {
-            other.parameters[place] = value;
-        }
-    }
-    other.parameters[0] = strength;
-    Some(other)
-}
-
-/// Factor on the loss of a candidate in comparisons: effects of the catalogue in their usual form are more likely than others.
+/// Factor on the loss of a candidate in comparisons: effects of the catalogue in their usual form are more likely than others. Of two kinds
+/// neither is the usual one.
 fn handicap(effect: &ActiveEffect) -> f64 {
     let parameters = effect.descriptor().parameters;
-    let unusual = |(spec, value): (&ParameterSpec, f64)| !spec.forms.is_empty() && value != spec.default;
+    let unusual = |(spec, value): (&ParameterSpec, f64)| {
+        !spec.is_choice && !spec.forms.is_empty() && value != spec.default
+    };
     let is_unusual = law::of(effect).is_some() || parameters.iter().zip(effect.parameters).any(unusual);
     let fitted = parameters.iter().filter(|spec| !spec.is_choice).count();
     POLICY.handicap(fitted, !is_unusual)

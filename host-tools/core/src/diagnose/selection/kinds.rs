@@ -24,14 +24,9 @@ impl Search<'_> {
         let Explanation { fit: present, chosen } = now;
         let place = present.layout.first_found() + index;
         let found = present.solution.model.effects[place];
-        let Some(spec) = found.descriptor().parameters.iter().find(|spec| spec.is_choice) else {
-            return Ok(());
-        };
-        let others = spec.forms.iter().map(|form| found.with(spec.name, *form));
-        for other in others.filter(|other| other.parameters != found.parameters) {
-            if self.progress.interrupted() {
-                return Ok(());
-            }
+        if let Some(other) = found.in_other_kind()
+            && !self.progress.interrupted()
+        {
             let mut model = present.solution.model.clone();
             model.effects[place] = other;
             let likelier = |loss: f64, others_loss: f64| {
@@ -44,7 +39,7 @@ impl Search<'_> {
             let ranked = solve_for_ranking(self.objective, &model, &free, PATIENCE, &known)?;
             let ranked = self.judged(present.layout.clone(), ranked, false);
             if !likelier(present.loss_on(found.bench), ranked.loss_on(found.bench)) {
-                continue;
+                return Ok(());
             }
             let with = self.fit(present.layout.clone(), &ranked.solution.model, &[FINE_STEP, FINE_STEP])?;
             if likelier(present.loss_on(found.bench), with.loss_on(found.bench))
@@ -104,6 +99,40 @@ mod tests {
         assert_eq!((rubbing.effect.parameters[2], springy.effect.descriptor().id), (1.0, "joint_spring"));
         assert_eq!(now.fit.solution.model.effects[now.fit.layout.first_found()], rubbing.effect);
         assert!(now.fit.loss < 0.5 * loss_before, "{loss_before} to {}", now.fit.loss);
+    }
+
+    /// Friction that falls with speed, found as a spring up to its level, becomes what it is: the excess and the turn double.
+    #[test]
+    fn friction_that_falls_with_speed_becomes_the_other_kind() {
+        let kind = |exponent: f64, [excess_nm, speed_rad_s, presliding_rad]: [f64; 3]| {
+            ActiveEffect::with_defaults(find("motor_stribeck_friction").unwrap())
+                .with("excess_nm", excess_nm)
+                .with("speed_rad_s", speed_rad_s)
+                .with("coulomb_nm", 0.2)
+                .with("presliding_rad", presliding_rad)
+                .with("presliding_exponent", exponent)
+        };
+        let there = [0.2, 0.1, 4e-3];
+        let other = kind(0.0, [0.1, 0.15, 2e-3]).in_other_kind().unwrap();
+        for (value, expected) in other.parameters.iter().zip(kind(1.0, there).parameters) {
+            assert!((value - expected).abs() < 1e-12, "{:?}", other.parameters);
+        }
+        let back = kind(1.0, there).in_other_kind().unwrap();
+        assert_eq!(back.parameters, kind(0.0, [0.1, 0.1 * 1.5, 2e-3]).parameters);
+    }
+
+    /// A candidate is tried in both kinds before it is ranked.
+    #[test]
+    fn candidates_are_fitted_in_both_kinds() {
+        let recording = test_bench::swung(3000);
+        let model = JointModel::from_rig(&test_bench::rig(), &recording).unwrap();
+        let recording = test_bench::measured(&model, recording, &[friction(1.0)]);
+        let objective = Objective::new(&model, &[recording], &[], true).unwrap();
+        let asked = Asked::default();
+        let search = Search { objective: &objective, believed: &model, asked: &asked, progress: &Quiet };
+        let nothing = search.fit(Layout::of(&model), &model, &[COARSE_STEP]).unwrap();
+        let fits = search.one_of(&nothing, |effect| effect.is_alike(&friction(0.0)), f64::INFINITY).unwrap();
+        assert_eq!(fits[0].newest().parameters[2], 1.0);
     }
 
     /// Found as a spring up to its level, it becomes what it is, with the turn over which it builds up; and a spring stays one.

@@ -218,6 +218,7 @@ impl Search<'_> {
             }
             Ok::<(), Failure>(())
         })?;
+        self.try_other_kinds(present, slopes, ranked, &mut fits)?;
         if let Some(anew) = self.anew(present) {
             fits.par_iter_mut().try_for_each(|(place, fitted)| {
                 let screened = Screened { room: Some(anew.clone()), ..ranked[*place].clone() };
@@ -231,6 +232,38 @@ impl Search<'_> {
             })?;
         }
         Ok(fits)
+    }
+
+    /// Replaces coarse fits by those of the other kind of their effect where that leaves less: the wrong kind of friction that falls with speed
+    /// leaves no less than friction that does not.
+    fn try_other_kinds(
+        &self,
+        present: &Fitted,
+        slopes: &Slopes,
+        ranked: &[Screened],
+        fits: &mut [(usize, Fitted)],
+    ) -> Result<(), Failure> {
+        let best = fits.iter().map(|(_, fitted)| fitted.loss).fold(f64::INFINITY, f64::min);
+        fits.par_iter_mut().try_for_each(|(place, fitted)| {
+            let other = fitted.newest().in_other_kind();
+            if let Some(start) = other
+                && fitted.loss <= BEHIND_OF_TENDONS * best
+                && !self.progress.interrupted()
+            {
+                let parameters = fitted.solution.model.parameters;
+                let room = Some(JointModel { parameters, ..present.solution.model.clone() });
+                let other = self.fit_new(
+                    present,
+                    slopes,
+                    &Screened { start, room, ..ranked[*place].clone() },
+                    false,
+                )?;
+                if other.loss < fitted.loss {
+                    *fitted = other;
+                }
+            }
+            Ok(())
+        })
     }
 
     /// `present` with the parameters that the rig states, where one of them has run off to make up for what is missing: the optimiser finds no
