@@ -553,14 +553,15 @@ fn remove(chosen: &mut Vec<Chosen>, places: &[usize]) {
 }
 
 /// Factor on the loss of a candidate in comparisons: effects of the catalogue in their usual form are more likely than others. Of two kinds
-/// neither is the usual one.
+/// neither is the usual one; the one that is not tried first counts as a parameter, so that a recording that does not tell them apart changes none.
 fn handicap(effect: &ActiveEffect) -> f64 {
     let parameters = effect.descriptor().parameters;
     let unusual = |(spec, value): (&ParameterSpec, f64)| {
         !spec.is_choice && !spec.forms.is_empty() && value != spec.default
     };
     let is_unusual = law::of(effect).is_some() || parameters.iter().zip(effect.parameters).any(unusual);
-    let fitted = parameters.iter().filter(|spec| !spec.is_choice).count();
+    let counts = |(spec, value): &(&ParameterSpec, f64)| !spec.is_choice || *value != spec.default;
+    let fitted = parameters.iter().zip(effect.parameters).filter(counts).count();
     POLICY.handicap(fitted, !is_unusual)
 }
 

@@ -258,7 +258,7 @@ impl Search<'_> {
                     &Screened { start, room, ..ranked[*place].clone() },
                     false,
                 )?;
-                if other.loss < fitted.loss {
+                if other.handicapped() < fitted.handicapped() {
                     *fitted = other;
                 }
             }
