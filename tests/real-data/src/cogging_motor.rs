@@ -243,6 +243,7 @@ fn terms(physics: Physics, harmonics: &[u32], motion: (&[f64], &[f64], &[f64]), 
                     build_up: bowden_model::dry_friction::BuildUp::Linear,
                     gear_play_rad: 0.0,
                     drag_behind_play: 0.0,
+                    standstill_excess_nm: 0.0,
                 };
                 active.effect.motor(&active.parameters, &mut state, &mut port);
                 let turned_rad = if k == 0 { 0.0 } else { theta_rad[k] - theta_rad[k - 1] };

@@ -158,6 +158,7 @@ fn gear_friction_grows_with_the_given_power_of_the_torque_carried() {
             build_up: bowden_model::dry_friction::BuildUp::Linear,
             gear_play_rad: 0.0,
             drag_behind_play: 0.0,
+            standstill_excess_nm: 0.0,
         };
         active.effect.motor(&active.parameters, &mut [0.0; MAX_STATE], &mut port);
         port.coulomb_nm
