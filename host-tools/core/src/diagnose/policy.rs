@@ -144,10 +144,10 @@ impl Policy {
         value.abs() < self.interval_stds * std
     }
 
-    /// Odds of a candidate whose loss is `loss_ratio` times that of the named effect.
+    /// Odds of a candidate whose loss is `loss_ratio` times that of the named effect; 0 where its simulation ran away, so that it has no loss.
     #[must_use]
     pub fn odds(&self, loss_ratio: f64) -> f64 {
-        loss_ratio.powf(-self.odds_per_loss_ratio)
+        if loss_ratio.is_nan() { 0.0 } else { loss_ratio.powf(-self.odds_per_loss_ratio) }
     }
 
     /// Whether a candidate with these odds is listed as a rival of the named effect.
@@ -186,6 +186,7 @@ mod tests {
     fn a_rival_that_leaves_two_fifths_more_is_no_longer_listed() {
         assert!((POLICY.odds(1.2) - 0.1615).abs() < 1e-4);
         assert!(POLICY.is_listed(POLICY.odds(1.41)) && !POLICY.is_listed(POLICY.odds(1.43)));
+        assert_eq!([f64::INFINITY, f64::NAN].map(|ratio| POLICY.odds(ratio)), [0.0; 2]);
         assert_eq!(POLICY.presence(0.1), 0.5);
         assert!(POLICY.presence(0.9) > 0.999);
     }
