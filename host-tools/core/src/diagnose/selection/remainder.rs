@@ -4,6 +4,7 @@ use bowden_model::effect::ActiveEffect;
 use bowden_model::effects::find;
 
 use super::{PATIENCE, Selected, handicap};
+use crate::diagnose::at_full_resolution;
 use crate::diagnose::layout::Layout;
 use crate::fit::objective::{Objective, Part};
 use crate::fit::solver::{FINE_STEP, solve_in_rounds};
@@ -40,14 +41,9 @@ impl Selected {
     ) -> Result<bool, Failure> {
         let believed = &self.baseline.model;
         let layout = &self.present.layout;
-        let at_full_resolution = JointModel {
-            elements: model.elements,
-            step_s: model.step_s,
-            guide_stride: model.guide_stride,
-            ..self.searched().clone()
-        };
+        let searched = at_full_resolution(self.searched(), model);
         for chosen in &self.chosen {
-            let mut found = at_full_resolution.effects.iter().enumerate().skip(layout.first_found());
+            let mut found = searched.effects.iter().enumerate().skip(layout.first_found());
             let place = found.find(|(_, one)| one.is_beside(&chosen.effect)).map(|(place, _)| place);
             let Some((place, other)) = place.zip(remainder(believed, &chosen.effect)) else { continue };
             if self.chosen.iter().any(|one| one.effect.is_beside(&other))
@@ -55,7 +51,7 @@ impl Selected {
             {
                 continue;
             }
-            let (bare, without) = layout.without(&at_full_resolution, place - layout.first_found());
+            let (bare, without) = layout.without(&searched, place - layout.first_found());
             let (other_layout, with_other) = bare.with(&without, other);
             let handicapped = |layout: &Layout, start: &JointModel, effect: &ActiveEffect| {
                 let free = layout.free(believed, start);
@@ -63,7 +59,7 @@ impl Selected {
                 let loss = objective.mean_loss_on(effect.bench, &fitted.residuals, Part::Training);
                 Ok::<_, Failure>(handicap(effect) * loss)
             };
-            let of_itself = handicapped(layout, &at_full_resolution, &chosen.effect)?;
+            let of_itself = handicapped(layout, &searched, &chosen.effect)?;
             if of_itself < handicapped(&other_layout, &with_other, &other)? {
                 return Ok(true);
             }
